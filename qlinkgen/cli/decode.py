@@ -168,7 +168,7 @@ def message_record(protocol: Protocol, found: Message) -> dict[str, Json]:
     name = protocol.address_name
     if name and message.addresses:
         record[record_key(name)] = getattr(found, address_attribute(name))
-    for value in protocol.frame_values:
+    for value in protocol.beside(message):
         record[record_key(value.name)] = to_json(value, getattr(found, attribute(value.name)))
     record["fields"] = fields(message, found)
     reply = protocol.replies.get(message.name)

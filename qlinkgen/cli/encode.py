@@ -105,7 +105,11 @@ def compose(
     address = _one(addresses) if addresses else record.address
     warn_unconfirmed(protocol, found)
     codec = codec or load_codec(protocol)
-    return codec, found, build(codec, found, given, _address(protocol, found, address), protocol.frame_values)
+    return (
+        codec,
+        found,
+        build(codec, found, given, _address(protocol, found, address), protocol.beside(found)),
+    )
 
 
 @dataclass(frozen=True, slots=True)

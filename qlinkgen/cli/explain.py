@@ -106,7 +106,7 @@ def _doubt(found: Dissection) -> tuple[int, int, bool]:
     """Return a sort key, larger for a less likely direction: early fault, number of faults, payload size."""
     early = len(PROGRESS) - PROGRESS.index(found.kind) if found.kind else 0
     payload = found.message.payload if found.message else None
-    cell = found.cells.get(found.plan.frame.envelope.payload.name)
+    cell = found.cells.get(found.frame.envelope.payload.name)
     fits = payload and cell and payload.least <= len(cell.data) <= payload.most
     return early, len(found.faults), not fits
 
@@ -136,7 +136,7 @@ def _show(found: Sequence[Dissection], hints: Sequence[str]) -> None:
 
 def _title(found: Dissection) -> str:
     name = found.message.name if found.message else f"unknown {found.direction}"
-    return name if found.address is None else f"{name}, {found.plan.frame.address} {found.address}"
+    return name if found.address is None else f"{name}, {found.frame.address} {found.address}"
 
 
 def _lines(found: Dissection) -> list[Line]:

@@ -48,7 +48,7 @@ def notes(found: Dissection) -> list[str]:
 
 def finding(found: Dissection, fault: Fault, start: int = 0) -> Words:  # noqa: C901, PLR0912  # a case a rule
     """Return rule and cause; ``start`` is the offset of the frame in all bytes."""
-    of, at, name = fault.of, fault.at + start, found.plan.frame.address
+    of, at, name = fault.of, fault.at + start, found.frame.address
     match fault.rule:
         case Rule.BEGINNING:
             return _beginning(found, fault)
@@ -69,11 +69,11 @@ def finding(found: Dissection, fault: Fault, start: int = 0) -> Words:  # noqa: 
             return f"{of.name} is {fault.seen}, allowed are {span_text(of.least, of.most)}", cause
         case Rule.TERMINATOR:
             assert isinstance(of, ConstantPart)
-            most = found.plan.frame.max_wire
+            most = found.frame.max_wire
             return f"no {of.data.hex(' ')} within {most} bytes, the longest frame", _LOST
         case Rule.COUNTED:
             assert isinstance(of, LengthPart)
-            size = of.number(len(found.cells[found.plan.frame.envelope.payload.name].data))
+            size = of.number(len(found.cells[found.frame.envelope.payload.name].data))
             rule = f"{of.name} is {fault.seen}, but up to the terminator it is {size}"
             return rule, "bytes were lost or added"
         case Rule.LAST:
@@ -109,11 +109,11 @@ def counted(number: int | None) -> str:
 
 def _beginning(found: Dissection, fault: Fault) -> Words:
     if isinstance(fault.of, MarkPart):
-        end = found.plan.frame.envelope.parts[-1]
+        end = found.frame.envelope.parts[-1]
         other = end.end_id if isinstance(end, MarkPart) else 0
         rule = f"no byte with 0x{fault.of.marker:02X} set and {fault.of.id_name} other than {other}"
         return f"header missing: {rule}", "the capture began late, or the header was lost"
-    preamble = found.plan.frame.envelope.preamble.hex(" ")
+    preamble = found.frame.envelope.preamble.hex(" ")
     cause = "the capture began late, or a byte of the preamble was lost"
     return f"preamble {preamble} missing", cause
 
@@ -121,7 +121,7 @@ def _beginning(found: Dissection, fault: Fault) -> Words:
 def _constant(found: Dissection, fault: Fault) -> Words:
     part = fault.of
     assert isinstance(part, ConstantPart | CellPart | EqualPart)
-    right = part.data.hex(" ") if isinstance(part, ConstantPart) else part_text(part, found.plan.frame)
+    right = part.data.hex(" ") if isinstance(part, ConstantPart) else part_text(part, found.frame)
     if isinstance(part, EqualPart):
         other = part.of.integer.unpack(found.cells[part.of.name].data)
         right = f"{right}: {part.integer.pack(part.value(other)).hex(' ')}"
@@ -130,11 +130,11 @@ def _constant(found: Dissection, fault: Fault) -> Words:
 
 def _start(found: Dissection) -> str:
     """Return the name of the first part of a frame."""
-    return "header" if isinstance(found.plan.frame.end, ByMark) else "preamble"
+    return "header" if isinstance(found.frame.end, ByMark) else "preamble"
 
 
 def _interrupted(found: Dissection, at: int) -> Words:
-    if isinstance(found.plan.frame.end, ByMark):
+    if isinstance(found.frame.end, ByMark):
         cause = "the end byte was lost, or two nodes sent at once"
         return f"a header at offset {at}, before the end of the frame", cause
     cause = "the sender was interrupted or bytes were lost: this frame is truncated"
@@ -142,7 +142,7 @@ def _interrupted(found: Dissection, at: int) -> Words:
 
 
 def _unknown(found: Dissection, fault: Fault) -> Words:
-    frame, number = found.plan.frame, fault.seen or 0
+    frame, number = found.frame, fault.seen or 0
     near = _nearest(number, list(found.plan.known(found.direction).values()))
     cause = f"the nearest known is {near.message.command}, {id_text(frame, near.id)}" if near else ""
     return f"{frame.id_name} {id_text(frame, number)} is unknown", cause
@@ -154,12 +154,12 @@ def _address(found: Dissection, fault: Fault) -> Words:
     if isinstance(fault.of, MarkPart):
         cause = "no node has this address; the destination node has forwarded the frame"
     allowed = addresses_text(found.message.message)
-    return f"{found.plan.frame.address} is {fault.seen}; {found.message.name} has {allowed}", cause
+    return f"{found.frame.address} is {fault.seen}; {found.message.name} has {allowed}", cause
 
 
 def _missing(found: Dissection, fault: Fault) -> Words:
-    end, number = found.plan.frame.end, counted(fault.seen)
-    what = "packet" if found.plan.frame.needs_request else "frame"
+    end, number = found.frame.end, counted(fault.seen)
+    what = "packet" if found.frame.needs_request else "frame"
     if isinstance(end, ByMark):
         return "end byte missing", _LOST
     if isinstance(end, ByLength):
@@ -177,10 +177,10 @@ def _missing(found: Dissection, fault: Fault) -> Words:
 
 
 def _stuffing(found: Dissection, fault: Fault, at: int) -> Words:
-    way = found.plan.frame.transparency
+    way = found.frame.transparency
     if isinstance(way, Coded):
         seen = "the end of the coded bytes" if fault.seen is None else f"{fault.seen:02x}"
-        return f"{seen} at offset {at} is wrong: {transparency_text(found.plan.frame)}", _LOST
+        return f"{seen} at offset {at} is wrong: {transparency_text(found.frame)}", _LOST
     assert isinstance(way, FrameStuffing | PayloadStuffing)
     seen = "the end of the payload" if fault.seen is None else f"{fault.seen:02x}"
     after = f"{way.rule.after.hex(' ')} at offset {at - len(way.rule.after)}"
@@ -192,9 +192,9 @@ def _size(found: Dissection, fault: Fault) -> Words:
     message, lost = found.message, "bytes were lost or added"
     size = fault.seen or 0
     if message is None:
-        return f"payload of {counted(size)}, the frame allows {found.plan.frame.max_payload}", lost
+        return f"payload of {counted(size)}, the frame allows {found.frame.max_payload}", lost
     envelope, payload = message.envelope, message.payload
-    if isinstance(found.plan.frame.end, ByMark):
+    if isinstance(found.frame.end, ByMark):
         check = envelope.check
         beside = check.size if check else 0
         between = size + (len(found.cells[check.name].data) if check else 0)
@@ -218,11 +218,11 @@ def _check(found: Dissection, fault: Fault) -> Words:
     expected = found.expected[part.name]
     if isinstance(part, BlocksPart):
         return _block(found, part, fault, expected)
-    text = check_text(part.check, found.plan.frame)
+    text = check_text(part.check, found.frame)
     rule = f"{part.name} is {check_number(part, received)}, but {text} gives {check_number(part, expected)}"
     if part.check.chained:
-        payload = found.cells[found.plan.frame.envelope.payload.name].data
-        return rule, explain_sum(part.check, found.plan.frame.id_name, found.request, payload, received)
+        payload = found.cells[found.frame.envelope.payload.name].data
+        return rule, explain_sum(part.check, found.frame.id_name, found.request, payload, received)
     if received == expected:
         return rule, "unused bits of its bytes are set"
     over = part.check.over
@@ -234,7 +234,7 @@ def _check(found: Dissection, fault: Fault) -> Words:
 
 def _block(found: Dissection, part: BlocksPart, fault: Fault, expected: int) -> Words:
     index = found.cells[part.name].places.index(fault.at) // part.check.size
-    payload = found.cells[found.plan.frame.envelope.payload.name]
+    payload = found.cells[found.frame.envelope.payload.name]
     block = slice(index * part.every, (index + 1) * part.every)
     own = list(zip(payload.places[block], payload.data[block], strict=True))
     received = fault.seen or 0
@@ -245,10 +245,10 @@ def _block(found: Dissection, part: BlocksPart, fault: Fault, expected: int) -> 
 
 def _coverages(found: Dissection, plain: Mapping[str, bytes], over: Sequence[str]) -> list[Coverage]:
     """Return possible coverages of the check value."""
-    way = found.plan.frame.transparency
+    way = found.frame.transparency
     match way:
         case PayloadStuffing():
-            name = found.plan.frame.envelope.payload.name
+            name = found.frame.envelope.payload.name
             bare = way.unstuff(plain[name])
             others = plain if bare is None else {**plain, name: bare}
             return coverages(plain, over, others, " without the stuffing")

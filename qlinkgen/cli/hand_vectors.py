@@ -110,10 +110,10 @@ def _mismatch(protocol: Protocol, codec: ModuleType, row: Vector) -> str:
     if wrong := [each for each in addresses if each != key]:
         return f"frames have no {wrong[0]}"
     given = {name: addresses[key]} if name and key in addresses else {}
-    keys = {value.name: record_key(value.name) for value in protocol.frame_values}
+    keys = {value.name: record_key(value.name) for value in protocol.beside(message)}
     every = cast(Mapping[str, Json], row)  # its other keys depend on the frame
     beside = {name: every[key] for name, key in keys.items() if key in every}
-    built = build(codec, message, {**beside, **row["fields"]}, given, protocol.frame_values)
+    built = build(codec, message, {**beside, **row["fields"]}, given, protocol.beside(message))
     request = [codec.decode_request(bytes.fromhex(row["request"]))] if "request" in row else []
     payload, wire = bytes.fromhex(row["payload"]), bytes.fromhex(row["wire"])
     if row.get("decode_only"):

@@ -41,9 +41,9 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 def envelopes(plan: Plan) -> Sequence[tuple[str, Envelope]]:
     """Return the distinct envelopes, with their titles."""
     directions = plan.protocol.directions
-    if len({plan.frame.envelopes[each] for each in directions}) == 1:
-        return [("Frame", plan.frame.envelopes[directions[0]])]
-    return [(f"Frame of a {each}", plan.frame.envelopes[each]) for each in directions]
+    if len({plan.frames[each].envelope for each in directions}) == 1:
+        return [("Frame", plan.frames[directions[0]].envelope)]
+    return [(f"Frame of a {each}", plan.frames[each].envelope) for each in directions]
 
 
 def parts_table(

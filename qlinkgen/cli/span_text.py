@@ -63,14 +63,14 @@ def value_of(found: Dissection, span: Span) -> tuple[str, str]:
 def _of_part(found: Dissection, part: Part, span: Span) -> str:
     match part:
         case ConstantPart():
-            first = part is found.plan.frame.envelopes[found.direction].parts[0]
+            first = part is found.frame.envelope.parts[0]
             return f"must be {part.data.hex(' ')}" if span.fault else "preamble" if first else ""
         case LengthPart() | AddressPart():
             return str(span.number)
         case IdPart():
             return _id(found)
         case CellPart() | EqualPart():
-            return f"0x{span.number or 0:0{2 * part.size}X}, {part_text(part, found.plan.frame)}"
+            return f"0x{span.number or 0:0{2 * part.size}X}, {part_text(part, found.frame)}"
         case MarkPart():
             return _mark(found, part, span)
         case PayloadPart():
@@ -108,7 +108,7 @@ def _id(found: Dissection) -> str:
     number = found.number or 0
     messages = [message for message in found.plan.messages if message.id == number]
     names = dict.fromkeys(message.message.command for message in messages)
-    return f"{id_text(found.plan.frame, number)} ({', '.join(names) or 'unknown'})"
+    return f"{id_text(found.frame, number)} ({', '.join(names) or 'unknown'})"
 
 
 def _mark(found: Dissection, part: MarkPart, span: Span) -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 from qlinkgen.model.checksum import Checksum as Algorithm
 from qlinkgen.model.coding import Coding, Escape, Insert
@@ -19,6 +19,8 @@ from qlinkgen.model.types import Scalar
 ATTRIBUTE = "attribute."
 #: Bytes of a pair.
 _PAIR = 2
+#: The side that a frame goes to: "request" to the slave, "response" to the master.
+Direction = Literal["request", "response"]
 #: The role of a part of a frame.
 Role = Literal[
     "constant", "length", "message", "address", "payload", "checksum", "terminator", "bits", "derived"
@@ -125,6 +127,8 @@ class Part:
     doc: Text = ""
     section: Text = ""
     confirmed: bool = True
+    #: The direction whose frames have it, None for both.
+    only: Direction | None = None
     constant: bytes = b""
     shared: bool = False
     scalar: Scalar | None = None
@@ -149,6 +153,14 @@ class Part:
         """The part as a field, for its values."""
         assert self.scalar is not None
         return Field(self.name, self.scalar, self.doc, self.section, self.confirmed)
+
+    def among(self, names: frozenset[str]) -> Part:
+        """The part where a frame has only parts with these names: it counts and covers no others."""
+        checksum = self.checksum
+        if checksum:
+            over = tuple(each for each in checksum.over if each in names or each.startswith(ATTRIBUTE))
+            checksum = replace(checksum, over=over)
+        return replace(self, counts=tuple(each for each in self.counts if each in names), checksum=checksum)
 
     @property
     def size(self) -> int:
@@ -197,6 +209,24 @@ class DelimitedFrame:
     section: Text = ""
 
     kind = "delimited"
+
+    @property
+    def directed(self) -> bool:
+        """Whether some parts are only in frames of one direction."""
+        return any(part.only for part in self.parts)
+
+    @property
+    def ways(self) -> tuple[Direction, ...]:
+        """The directions whose frames differ; one of them where none do."""
+        return get_args(Direction) if self.directed else ("response",)
+
+    def towards(self, direction: str) -> DelimitedFrame:
+        """The frame of a direction, without the parts that only the other has."""
+        if not self.directed:
+            return self
+        parts = tuple(part for part in self.parts if part.only in (None, direction))
+        names = frozenset(part.name for part in parts)
+        return replace(self, parts=tuple(part.among(names) for part in parts))
 
     def part(self, role: Role) -> Part | None:
         """The first part with a role."""

@@ -91,6 +91,11 @@ class Protocol:
         """Values of every frame, beside those of its message."""
         return self.frame.values if isinstance(self.frame, DelimitedFrame) else ()
 
+    def beside(self, message: Message) -> tuple[Value, ...]:
+        """Values of the frame of a message."""
+        frame = self.frame
+        return frame.towards(message.direction).values if isinstance(frame, DelimitedFrame) else ()
+
     @property
     def counter(self) -> PartBits | None:
         """The counter among the values of frames, None if there is none."""

@@ -9,7 +9,7 @@ from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import select
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import OneOf, Within
-from qlinkgen.plan.framing import FramePlan, frame_plan
+from qlinkgen.plan.framing import FramePlan, frame_plans
 from qlinkgen.plan.parts import (
     AddressPart,
     BlocksPart,
@@ -33,14 +33,14 @@ def plan_of(protocol: Protocol, options: Options | None = None) -> Plan:
     """Plan a protocol for an output."""
     options = options or Options()
     messages = select.kept(protocol, options)
-    frame = frame_plan(protocol.frame)
+    frames = frame_plans(protocol.frame)
     names = {message.name for message in messages}
     used = select.named(messages)
     return Plan(
         protocol=protocol,
         role=options.role,
-        frame=frame,
-        messages=tuple(_message(frame, message, options) for message in messages),
+        frames=frames,
+        messages=tuple(_message(frames[message.direction], message, options) for message in messages),
         commands=tuple(command for command in protocol.commands if command.request.name in names),
         enums=tuple(each for each in protocol.enums if not options.only or each.name in used),
         flags=tuple(each for each in protocol.flags if not options.only or each.name in used),
@@ -50,7 +50,7 @@ def plan_of(protocol: Protocol, options: Options | None = None) -> Plan:
 
 def _message(frame: FramePlan, message: Message, options: Options) -> MessagePlan:
     payload = payload_plan(message, frame.envelope.payload.trim)
-    envelope = frame.with_check(message.direction, checked=message.checksum)
+    envelope = frame.with_check(checked=message.checksum)
     size = envelope.overhead + payload.most
     size += envelope.blocks.added(payload.most) if envelope.blocks else 0
     return MessagePlan(

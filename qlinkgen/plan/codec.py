@@ -151,7 +151,7 @@ class Codec:
 
     def join(self, message: MessagePlan, cells: Mapping[str, bytes], request: bytes = b"") -> bytes:
         """The frame of these parts as sent; computes the check values that are not among them."""
-        envelope, transparency = message.envelope, self.plan.frame.transparency
+        envelope, transparency = message.envelope, self.plan.frames[message.direction].transparency
         for part in envelope.filling:
             if part.name not in cells:
                 value = self.check_value(part, envelope, cells, request)
@@ -194,7 +194,7 @@ class Codec:
             raise BadFrame(no_frame.kind, no_frame.at) from None
 
     def _decode(self, wire: bytes, direction: Direction, request: bytes) -> Decoded:
-        frame, known = self.plan.frame, self.plan.known(direction)
+        frame, known = self.plan.frames[direction], self.plan.known(direction)
         match frame.receiver:
             case InStep():
                 return self._packet(wire, direction, request)
@@ -202,7 +202,7 @@ class Codec:
                 return self.judge(read_marked(frame, known, wire), direction)
             case Hunt() | Rescan():
                 hunting = isinstance(frame.receiver, Hunt)
-                taken = frame_reader(frame, known, direction).read(wire, hunting=hunting)
+                taken = frame_reader(frame, known).read(wire, hunting=hunting)
                 if wire[taken.end :] not in (b"", taken.due):
                     raise BadFrame("length", taken.end)
                 return self.judge(taken, direction)
@@ -212,7 +212,7 @@ class Codec:
     def judge(self, taken: Taken, direction: Direction, request: bytes = b"") -> Decoded:
         """Check a frame whose parts have been read and decode its message. Raises BadFrame."""
         message = self.plan.known(direction).get(-1 if taken.number is None else taken.number)
-        envelope = message.envelope if message else self.plan.frame.envelopes[direction]
+        envelope = message.envelope if message else self.plan.frames[direction].envelope
         for part in envelope.checks:
             if part not in envelope.seeded:
                 self._verify(part, envelope, taken, taken.cells, request)

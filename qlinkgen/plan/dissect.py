@@ -97,10 +97,10 @@ class _Walk:
     """Divides one frame into parts, then checks them."""
 
     def __init__(self, codec: Codec, wire: bytes, direction: Direction, request: bytes, kind: str) -> None:
-        self.codec, self.plan, self.frame = codec, codec.plan, codec.plan.frame
+        self.codec, self.plan, self.frame = codec, codec.plan, codec.plan.frames[direction]
         self.wire, self.direction, self.request, self.kind = wire, direction, request, kind
         self.known = self.plan.known(direction)
-        self.envelope = self.frame.envelopes[direction]
+        self.envelope = self.frame.envelope
         stuffing = self.frame.transparency
         self.whole = stuffing if isinstance(stuffing, FrameStuffing) else None
         self.alone = stuffing if isinstance(stuffing, PayloadStuffing) else None

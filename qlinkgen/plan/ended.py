@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from qlinkgen.model.message import Direction
 from qlinkgen.plan.ends import ByTerminator
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.framing import FramePlan
@@ -127,7 +126,7 @@ class EndedReader(FrameReader):
                 self._check_known(taken.end, taken)
 
 
-def frame_reader(plan: FramePlan, known: Mapping[int, MessagePlan], direction: Direction) -> FrameReader:
-    """The reader of frames of parts; ``known`` are the messages of the direction, by number."""
+def frame_reader(plan: FramePlan, known: Mapping[int, MessagePlan]) -> FrameReader:
+    """The reader of frames of parts; ``known`` are the messages of their direction, by number."""
     kind = EndedReader if isinstance(plan.end, ByTerminator) else FrameReader
-    return kind(plan, known, direction)
+    return kind(plan, known)

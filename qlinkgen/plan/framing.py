@@ -60,10 +60,10 @@ from qlinkgen.plan.transparency import (
 
 @dataclass(frozen=True)
 class FramePlan:
-    """The frame around each message.
+    """The frame around the messages of a direction; in most protocols both directions have the same.
 
     Attributes:
-        envelopes: by direction; directions with equal envelopes share one object.
+        envelope: its parts.
         end: what determines the end of a frame.
         transparency: the stuffing of its bytes.
         receiver: how frames are found in a stream.
@@ -72,7 +72,7 @@ class FramePlan:
         idle: silence on the line that ends a frame early, None if the document states none.
     """
 
-    envelopes: Mapping[Direction, Envelope]
+    envelope: Envelope
     end: End
     transparency: Transparency
     receiver: Receiver
@@ -81,9 +81,18 @@ class FramePlan:
     idle: Silence | None = None
 
     @property
-    def envelope(self) -> Envelope:
-        """The envelope of responses; in most protocols every direction has the same."""
-        return self.envelopes["response"]
+    def search(self) -> Mapping[str, object]:
+        """What the search for frames depends on, by its name in error messages."""
+        envelope, end = self.envelope, self.end
+        check = envelope.check
+        return {
+            f"a first constant {envelope.preamble.hex(' ').upper()}": envelope.preamble,
+            "a check value": bool(envelope.checks or envelope.blocks),
+            "check values of blocks": envelope.blocks is not None,
+            "a covered attribute": bool(envelope.seeded),
+            "a check value of the header": check is not None and check in envelope.header_checks,
+            "parts after the terminator": isinstance(end, ByTerminator) and end.after > 0,
+        }
 
     @property
     def check(self) -> Check | None:
@@ -142,9 +151,9 @@ class FramePlan:
         """
         return len(self.flag) if isinstance(self.end, ByTerminator) and not self.end.after else 0
 
-    def with_check(self, direction: Direction, *, checked: bool) -> Envelope:
+    def with_check(self, *, checked: bool) -> Envelope:
         """The envelope of a message with (``checked``) or without a check value."""
-        envelope = self.envelopes[direction]
+        envelope = self.envelope
         if checked or envelope.check is None:
             return envelope
         return Envelope(tuple(part for part in envelope.parts if not isinstance(part, CheckPart)))
@@ -153,20 +162,29 @@ class FramePlan:
 # From the model
 
 
-def frame_plan(frame: Frame) -> FramePlan:
-    """Plan the frame of a protocol."""
+def frame_plan(frame: Frame, direction: Direction = "response") -> FramePlan:
+    """Plan the frames of a direction of a protocol."""
     match frame:
         case DelimitedFrame():
-            return _delimited(frame)
+            return _delimited(frame, direction)
         case MarkedFrame():
             return _marked(frame)
         case PacketFrame():
-            return _packet(frame)
+            return _packet(frame, direction)
         case _:
             assert_never(frame)
 
 
-def _delimited(frame: DelimitedFrame) -> FramePlan:
+def frame_plans(frame: Frame) -> Mapping[Direction, FramePlan]:
+    """The frames of each direction; directions with the same frame share one object."""
+    response = frame_plan(frame)
+    same = not (isinstance(frame, PacketFrame) or (isinstance(frame, DelimitedFrame) and frame.directed))
+    request = response if same else frame_plan(frame, "request")
+    return {"request": request, "response": response, "message": request}
+
+
+def _delimited(whole: DelimitedFrame, direction: Direction) -> FramePlan:
+    frame = whole.towards(direction)
     transparency = _transparency(frame)
     envelope = Envelope(_parts(frame, transparency))
     address = frame.address
@@ -176,10 +194,10 @@ def _delimited(frame: DelimitedFrame) -> FramePlan:
         assert isinstance(part, ConstantPart)
         end = ByTerminator(part, envelope.from_end(part) - part.size, stated.shared, frame.paired)
     return FramePlan(
-        envelopes=dict.fromkeys(("request", "response", "message"), envelope),
+        envelope=envelope,
         end=end,
         transparency=transparency,
-        receiver=_receiver(envelope, transparency),
+        receiver=_receiver(envelope, transparency, directed=whole.directed),
         address=address.name if address else "",
         id_name=frame.id_bits[-1].name if frame.id_bits else "",
         idle=frame.idle,
@@ -280,9 +298,9 @@ def _slot(bits: PartBits) -> Slot:
             assert_never(bits.role)
 
 
-def _receiver(envelope: Envelope, transparency: Transparency) -> Receiver:
+def _receiver(envelope: Envelope, transparency: Transparency, *, directed: bool) -> Receiver:
     """Choose between hunting and rescanning, for all targets."""
-    if isinstance(transparency, FrameStuffing) and _unique(envelope, transparency):
+    if not directed and isinstance(transparency, FrameStuffing) and _unique(envelope, transparency):
         return Hunt(transparency.rule.after[0], transparency.rule.insert)
     return Rescan(
         bare=not envelope.preamble,
@@ -325,7 +343,7 @@ def _marked(frame: MarkedFrame) -> FramePlan:
     check = (CheckPart("checksum", Check(frame.checksum)),) if frame.checksum else ()
     envelope = Envelope((header, PayloadPart("payload", 0, most, most), *check, end))
     return FramePlan(
-        envelopes=dict.fromkeys(("request", "response", "message"), envelope),
+        envelope=envelope,
         end=ByMark(header, end),
         transparency=SevenBit(frame.marker),
         receiver=Marks(),
@@ -334,7 +352,7 @@ def _marked(frame: MarkedFrame) -> FramePlan:
     )
 
 
-def _packet(frame: PacketFrame) -> FramePlan:
+def _packet(frame: PacketFrame, direction: Direction) -> FramePlan:
     payload = PayloadPart("payload", 0, frame.payload_max, frame.payload_max)
     number = IdPart(frame.id_name, Integer(8, signed=False, chunks=byte_chunks(1, "big")))
     request = Envelope((number, payload))
@@ -343,7 +361,7 @@ def _packet(frame: PacketFrame) -> FramePlan:
         value = Check(frame.checksum, frame.word_size, chained=True, rejected=frame.rejected)
         check = (CheckPart(frame.checksum_name, value),)
     return FramePlan(
-        envelopes={"request": request, "message": request, "response": Envelope((payload, *check))},
+        envelope=Envelope((payload, *check)) if direction == "response" else request,
         end=ByMessage(),
         transparency=Plain(),
         receiver=InStep(),

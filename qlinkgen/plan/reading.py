@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import assert_never
 
-from qlinkgen.model.message import Direction
 from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure
 from qlinkgen.plan.ends import ByLength, ByMark, ByMessage, ByTerminator, Rescan
@@ -178,11 +177,11 @@ class Cursor:
 class FrameReader:
     """Reads frames that end by length or by message."""
 
-    def __init__(self, plan: FramePlan, known: Mapping[int, MessagePlan], direction: Direction) -> None:
-        """``known`` are the messages of the direction, by number."""
+    def __init__(self, plan: FramePlan, known: Mapping[int, MessagePlan]) -> None:
+        """``known`` are the messages of the direction of the frame, by number."""
         self._plan = plan
         self._known = known
-        self._envelope = plan.envelopes[direction]
+        self._envelope = plan.envelope
         stuffing = plan.transparency
         self._whole = stuffing if isinstance(stuffing, FrameStuffing) else None
         self._alone = stuffing if isinstance(stuffing, PayloadStuffing) else None

@@ -46,6 +46,7 @@ class Receiver:
         self.plan = plan
         self.direction = direction
         self.codec = Codec(plan)
+        self.frame = plan.frames[direction]
         self.known = plan.known(direction)
         #: Bytes taken so far.
         self.taken = 0
@@ -119,9 +120,9 @@ class HuntingReceiver(Receiver):
     def __init__(self, plan: Plan, direction: Direction) -> None:
         """Hunt for a preamble."""
         super().__init__(plan, direction)
-        assert isinstance(plan.frame.receiver, Hunt)
-        self._mark = plan.frame.receiver.mark
-        self._reader = FrameReader(plan.frame, self.known, direction)
+        assert isinstance(self.frame.receiver, Hunt)
+        self._mark = self.frame.receiver.mark
+        self._reader = FrameReader(self.frame, self.known)
         self._marks = 0
         self._raw = b""
         #: Why the frame is not complete.
@@ -175,14 +176,14 @@ class RescanningReceiver(Receiver):
     def __init__(self, plan: Plan, direction: Direction) -> None:
         """Begin with an empty buffer."""
         super().__init__(plan, direction)
-        assert isinstance(plan.frame.receiver, Rescan)
-        self._strategy = plan.frame.receiver
-        self._reader = frame_reader(plan.frame, self.known, direction)
-        self._first, self._longest = plan.frame.envelopes[direction].preamble[:1], plan.frame.longest
+        assert isinstance(self.frame.receiver, Rescan)
+        self._strategy = self.frame.receiver
+        self._reader = frame_reader(self.frame, self.known)
+        self._first, self._longest = self.frame.envelope.preamble[:1], self.frame.longest
         self._buffer, self._skipped, self._due = b"", b"", b""
-        end = plan.frame.end
+        end = self.frame.end
         #: The terminator if only it may precede a frame.
-        self._line_end = end.part.data if isinstance(end, ByTerminator) and plan.frame.lines else b""
+        self._line_end = end.part.data if isinstance(end, ByTerminator) and self.frame.lines else b""
         #: No frame begins before the next one.
         self._lost = False
         #: Why the frame that may begin the buffer is not complete.
@@ -267,7 +268,7 @@ class RescanningReceiver(Receiver):
 
     def give_up(self) -> Iterator[Event]:
         """Give up the incomplete frame and search its bytes for others."""
-        if self._buffer not in (b"", self.plan.frame.flag) and not self._strategy.bare:
+        if self._buffer not in (b"", self.frame.flag) and not self._strategy.bare:
             yield self.event("truncated", self._buffer, self._start)
             self._buffer = self._buffer[1:]
         yield from self._scan()
@@ -281,9 +282,9 @@ class MarkReceiver(Receiver):
     def __init__(self, plan: Plan, direction: Direction) -> None:
         """Wait for a header."""
         super().__init__(plan, direction)
-        assert isinstance(plan.frame.end, ByMark)
-        self._header, self._end_id = plan.frame.end.header, plan.frame.end.end.end_id
-        envelope = plan.frame.envelopes[direction]
+        assert isinstance(self.frame.end, ByMark)
+        self._header, self._end_id = self.frame.end.header, self.frame.end.end.end_id
+        envelope = self.frame.envelope
         self._most = envelope.payload.most + (envelope.check.size if envelope.check else 0)
         self._raw = b""
         #: Bytes up to the next header belong to a fault already reported.
@@ -310,7 +311,7 @@ class MarkReceiver(Receiver):
     def _complete(self) -> Event:
         raw, self._raw = self._raw, b""
         try:
-            taken = take_marked(self.plan.frame, self.known, raw)
+            taken = take_marked(self.frame, self.known, raw)
         except BadFrame as bad:
             return self.event(bad.kind, raw)
         return self.judged(taken, raw, self.taken - len(raw))

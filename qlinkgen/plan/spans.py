@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from qlinkgen.model.message import Direction
+from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import Part
 from qlinkgen.plan.payload import Member, Step
 from qlinkgen.plan.tree import MessagePlan, Plan
@@ -158,3 +159,8 @@ class Dissection:
     kind: str
     cells: Mapping[str, Cell]
     expected: Mapping[str, int]
+
+    @property
+    def frame(self) -> FramePlan:
+        """The frame of its direction."""
+        return self.plan.frames[self.direction]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import get_args
 
@@ -15,7 +15,7 @@ from qlinkgen.model.types import Enum, Flags
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import OneOf
 from qlinkgen.plan.framing import FramePlan
-from qlinkgen.plan.payload import PayloadPlan
+from qlinkgen.plan.payload import Member, PayloadPlan
 from qlinkgen.plan.select import Role
 
 
@@ -71,7 +71,7 @@ class Plan:
     Attributes:
         protocol: names, texts and transactions, as the document states them.
         role: the role that the output is for.
-        frame: the frame around each message.
+        frames: the frame around each message, by direction; directions with the same frame share one object.
         messages: the selected messages, in schema order.
         commands: transactions whose request is selected; the response may not be in ``messages``.
         enums: enums used by selected messages; all enums if no message is left out.
@@ -81,12 +81,38 @@ class Plan:
 
     protocol: Protocol
     role: Role
-    frame: FramePlan
+    frames: Mapping[Direction, FramePlan]
     messages: tuple[MessagePlan, ...]
     commands: tuple[Command, ...]
     enums: tuple[Enum, ...]
     flags: tuple[Flags, ...]
     received_directions: tuple[Direction, ...]
+
+    @property
+    def frame(self) -> FramePlan:
+        """The frame of responses; in most protocols every direction has the same."""
+        return self.frames["response"]
+
+    @property
+    def directed(self) -> bool:
+        """Whether parts of frames are only in those of one direction, though both are found alike."""
+        return self.frames["request"] is not self.frame and not self.frame.needs_request
+
+    @property
+    def ways(self) -> Mapping[str, Plan]:
+        """The plans of each kind of frame, by the direction whose frames it is; "" if both have the same."""
+        if not self.directed:
+            return {"": self}
+        found: dict[str, Plan] = {}
+        for each in ("request", "response"):
+            found[each] = replace(self, frames=dict.fromkeys(self.frames, self.frames[each]))
+        return found
+
+    @cached_property
+    def beside(self) -> Mapping[str, Member]:
+        """The values of frames of any direction, by name."""
+        frames = (self.frames["request"], self.frame)
+        return {member.name: member for frame in frames for _, member in frame.envelope.values}
 
     @cached_property
     def layouts(self) -> tuple[Layout, ...]:

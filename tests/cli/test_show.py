@@ -141,7 +141,7 @@ def test_the_plan_of_everything(qlinkgen: Run, path: Path, capsys: pytest.Captur
     out = qlinkgen("show", path, "--plan").out
     assert out == qlinkgen("show", path, "--plan").out
     words = set(out.split())
-    assert words >= {part.name for envelope in plan.frame.envelopes.values() for part in envelope.parts}
+    assert words >= {part.name for frame in plan.frames.values() for part in frame.envelope.parts}
     assert words >= {message.name for message in plan.messages}
     for message in plan.messages:
         show_message_plan(plan, message)

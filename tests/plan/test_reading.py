@@ -33,7 +33,7 @@ def test_a_frame_that_is_cut_needs_more_and_no_more_than_it_has(
             Codec(plan).decode(wire, direction, request)
         except BadFrame:
             continue
-        reader = frame_reader(plan.frame, plan.known(direction), direction)
+        reader = frame_reader(plan.frames[direction], plan.known(direction))
         hunting = isinstance(plan.frame.receiver, Hunt)
         end = reader.read(wire, hunting=hunting).end
         for cut in range(end):

@@ -154,18 +154,16 @@ def presences(held: Sequence[Holder]) -> dict[str, Presence]:
 def _beside(plan: Plan, entry: JsonObject) -> dict[str, int]:
     """The values of the frame by name, raw."""
     found: dict[str, int] = {}
-    members = {member.name: member for _, member in plan.frame.envelope.values}
     for value in plan.protocol.frame_values:
         key = record_key(value.name)
         native = from_json(value, entry[key]) if key in entry else default_of(value)
-        found[value.name] = raw_number(value.name, members[value.name].number, native)
+        found[value.name] = raw_number(value.name, plan.beside[value.name].number, native)
     return found
 
 
 def _numbers(plan: Plan, header: Header, beside: Mapping[str, int]) -> bytes:
     """The values of the frame as a vector has them."""
-    members = {member.name: member for _, member in plan.frame.envelope.values}
-    return b"".join(number_bytes(raw, header.width(members[name].number)) for name, raw in beside.items())
+    return b"".join(number_bytes(raw, header.width(plan.beside[name].number)) for name, raw in beside.items())
 
 
 def most_values(header: Header, holders: Sequence[Holder]) -> int:

@@ -39,7 +39,7 @@ class Stream:
 
 def noise(plan: Plan) -> tuple[bytes, ...]:
     """Noise between frames: bytes that do not begin a frame, or begin one without completing it."""
-    envelope, strategy = plan.frame.envelopes[plan.received_directions[0]], plan.frame.receiver
+    envelope, strategy = plan.frames[plan.received_directions[0]].envelope, plan.frame.receiver
     match strategy:
         case Hunt() | Rescan():
             preamble = envelope.preamble

@@ -108,7 +108,7 @@ def _frames(plan: Plan, messages: Mapping[str, str], types: Types) -> Iterator[D
     frames = []
     for direction in plan.protocol.directions:
         name = "FRAME" if direction == "message" else f"{direction.upper()}_FRAME"
-        layout = _layout(frame.envelopes[direction], types) if frame.needs_request else Ref("LAYOUT")
+        layout = _layout(plan.frames[direction].envelope, types) if frame.needs_request else Ref("LAYOUT")
         chosen = Sequence(tuple(Ref(messages[each.name]) for each in plan.received(direction)))
         frames.append(Ref(name))
         yield Definition(name, _frame(frame, layout, chosen))

@@ -132,8 +132,8 @@ class ClassBuilder:
     @property
     def _packets(self) -> bool:
         """Whether requests and responses have different frames, and their classes different bases."""
-        envelopes = self._plan.frame.envelopes
-        return envelopes["request"] is not envelopes["response"]
+        frames = self._plan.frames
+        return frames["request"] is not frames["response"]
 
     def _shared_shapes(self) -> Mapping[Shape, tuple[str, MessagePlan]]:
         groups: dict[Shape, list[MessagePlan]] = {}

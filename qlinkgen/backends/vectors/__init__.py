@@ -110,7 +110,7 @@ class _Vectors:
         if good.address is not None:
             row[record_key(self._codec.plan.frame.address)] = good.address
         steps = {member.name: member for _, member in good.message.envelope.values}
-        for value in self._protocol.frame_values:
+        for value in self._protocol.beside(good.message.message):
             row[record_key(value.name)] = to_json(
                 value, native_of(steps[value.name], good.beside[value.name])
             )
