@@ -157,6 +157,8 @@ class Count:
     run: str
     #: The unit of the count.
     unit: Literal["items", "bytes"]
+    #: Names of fields of constant size whose bytes are counted too.
+    beside: tuple[str, ...] = ()
 
 
 #: How a codec treats an integer.

@@ -220,7 +220,7 @@ def holds_text(step: Step | Member) -> str:
         case ValueStep() | ConstantStep() | ReservedStep() | ItemsStep() | Member():
             return range_text(step.number)
         case CountStep():
-            return f"{count_unit(step)} of {step.run}"
+            return f"{count_unit(step)} of {counted_text(step)}"
         case BitsStep():
             return span_text(step.integer.minimum, step.integer.maximum)
         case BytesStep() | RecordStep() | RecordsStep():
@@ -266,7 +266,7 @@ def must_text(step: Step | Member) -> str:
         case ReservedStep():
             return f"anything; sent as {step.value}"
         case CountStep():
-            return f"{count_unit(step)} of {step.run}, {condition_text(step.bounds)}"
+            return f"{count_unit(step)} of {counted_text(step)}, {condition_text(step.bounds)}"
         case BitsStep() | RecordStep() | RecordsStep():
             return ""
         case BytesStep():
@@ -277,7 +277,12 @@ def must_text(step: Step | Member) -> str:
 
 def count_unit(step: CountStep) -> str:
     """The unit of a count."""
-    return "bytes" if step.term.packed or step.term.factor > 1 else "items"
+    return "bytes" if step.term.packed or step.term.factor > 1 or step.term.more else "items"
+
+
+def counted_text(step: CountStep) -> str:
+    """What a count counts: ``samples``, ``samples and 4 more bytes``."""
+    return f"{step.run} and {step.term.more} more bytes" if step.term.more else step.run
 
 
 def size_text(size: Size) -> str:
@@ -289,7 +294,8 @@ def size_text(size: Size) -> str:
 def term_text(term: Term) -> str:
     """The size of a run: ``2*samples``, ``(11*samples + 7) / 8``."""
     product = f"{term.factor}*{term.run}" if term.factor > 1 else term.run
-    return f"({product} + 7) / 8" if term.packed else product
+    product = f"({product} + 7) / 8" if term.packed else product
+    return f"{product} + {term.more}" if term.more else product
 
 
 def condition_text(rule: Condition) -> str:
@@ -325,11 +331,14 @@ def sizing_text(each: Sizing) -> str:
 
 
 def _counted_text(count: CountStep) -> str:
+    number, steps = count.name, count.term.packed or count.scale > 1
+    if count.term.more:
+        number = f"({number} - {count.term.more})" if steps else f"{number} - {count.term.more}"
     if count.term.packed:
         times, by = count.term.per_byte
-        product = f"{times}*{count.name}" if times > 1 else count.name
+        product = f"{times}*{number}" if times > 1 else number
         return f"{product} / {by}" if by > 1 else product
-    return f"{count.name} / {count.scale}" if count.scale > 1 else count.name
+    return f"{number} / {count.scale}" if count.scale > 1 else number
 
 
 # Parts ------------------------------------------------------------------------------------------------------

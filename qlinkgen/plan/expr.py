@@ -11,19 +11,24 @@ from qlinkgen.model.integer import packed_size
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """``factor`` bytes for each item of the run ``run``, or bits if they are ``packed`` to whole bytes."""
+    """``factor`` bytes for each item of the run ``run``, or bits if they are ``packed`` to whole bytes.
+
+    ``more`` is added to that: bytes that a count counts beside the run.
+    """
 
     run: str
     factor: int
     packed: bool = False
+    more: int = 0
 
     def value(self, number: int) -> int:
         """The size in bytes of so many items."""
-        return packed_size(number, self.factor) if self.packed else number * self.factor
+        return self.more + (packed_size(number, self.factor) if self.packed else number * self.factor)
 
     def items_in(self, size: int) -> int:
         """The number of items that fit a size."""
-        return 8 * size // self.factor if self.packed else size // self.factor
+        own = size - self.more
+        return 8 * own // self.factor if self.packed else own // self.factor
 
     @property
     def per_byte(self) -> tuple[int, int]:

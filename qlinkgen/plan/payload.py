@@ -111,7 +111,7 @@ class CountStep:
     """The size of ``run``, in items or bytes; filled by the codec.
 
     Attributes:
-        term: the number sent: the number of items, or the size of the run.
+        term: the number sent: the number of items, or the size of the run and of fields beside it.
         bounds: minimum and maximum of the number sent.
     """
 
@@ -133,7 +133,7 @@ class CountStep:
         """The number of items that a number within the bounds tells; None if it tells none."""
         if self.term.packed:
             return self.term.items_in(number)
-        return None if number % self.scale else number // self.scale
+        return None if (number - self.term.more) % self.scale else self.term.items_in(number)
 
 
 @dataclass(frozen=True)

@@ -152,10 +152,11 @@ class _Planner:
                 return ConstantStep(name, place, scalar.integer, scalar.default, scalar)
             case Reserved():
                 return ReservedStep(name, place, scalar.integer, scalar.default, scalar)
-            case Count(run, unit):
+            case Count(run, unit, beside):
                 counted = self._fields[run].type
                 assert isinstance(counted, Blob | Array | Records)
                 term = _term(run, counted) if unit == "bytes" else Term(run, 1)
+                term = replace(term, more=sum(self._fields[each].max_size for each in beside))
                 bounds = Within(term.value(counted.length.minimum), term.value(counted.length.maximum))
                 return CountStep(name, place, scalar.integer, run, term, bounds)
             case _:

@@ -120,12 +120,12 @@ class Walk:
 
     def _count(self, step: CountStep, number: int, at: int) -> None:
         if step.run in self.counts:
-            if number != self.counts[step.run] * step.scale:
+            if number != step.term.value(self.counts[step.run]):
                 raise Wrong(step.name, at)
-        elif number % step.scale or not step.bounds.holds(number):
+        elif (items := step.items(number)) is None or not step.bounds.holds(number):
             raise Wrong(step.name, at)
         else:
-            self.counts[step.run] = number // step.scale
+            self.counts[step.run] = items
 
     def decides(self, step: Step) -> bool:
         """Whether later sizes depend on the step."""

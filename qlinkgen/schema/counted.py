@@ -50,11 +50,11 @@ def _bounds(found: Fields, name: str, size: str, path: Path, report: Reporter) -
         what = f"{shown(size)} is not a field before {name}, which has as many items"
         report.error("bad-count", place, what, hint, needs=needs)
         return _UNKNOWN
-    if count.counts not in (None, name):
-        what = f"{size} already gives the size of {count.counts}"
+    if count.counts not in (None, [name]):
+        what = f"{size} already gives the size of {listed(count.counts or ())}"
         report.error("bad-count", place, what, f"give {name} a count of its own", needs=needs)
         return _UNKNOWN
     limits = count.range or count.raw_range
-    changes = {"counts": name, "range": None, "raw_range": None}
+    changes = {"counts": [name], "range": None, "raw_range": None}
     found[size] = count.model_copy(update=changes)
     return f"{limits.first}..{limits.last}" if limits is not None else ""

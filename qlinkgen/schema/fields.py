@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from qlinkgen.model.condition import exclusive
@@ -10,6 +10,7 @@ from qlinkgen.model.fields import Field, FieldType, Records, greatest_size
 from qlinkgen.model.types import Array, Blob, Count, Scalar
 from qlinkgen.schema.conditions import ConditionBuilder
 from qlinkgen.schema.counted import with_counts
+from qlinkgen.schema.counting import with_beside
 from qlinkgen.schema.file_fields import Fields, FieldSpec, RecordSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.location import Location
@@ -41,12 +42,13 @@ class FieldBuilder:
         ``asked`` are those with a number of items from the request.
         """
         specs = with_counts(specs, path, self._report)
-        fields = []
+        fields: list[Field] = []
         for name, spec in specs.items():
             kind = self._kind(spec, (*path, name))
             if kind is not None:
                 doc, confirmed = self._inherited(spec)
                 fields.append(Field(name, kind, doc, spec.section, confirmed, spec.echo))
+        fields = with_beside(fields, specs, path, self._report)
         fields = ConditionBuilder(specs, path, self._report).build(fields)
         fields = self._counted(fields, path, asked)
         self._check_open_ends(fields, path)
@@ -81,12 +83,11 @@ class FieldBuilder:
     def _counted(self, fields: Sequence[Field], path: Path, asked: Collection[str]) -> list[Field]:
         """The fields, each with the name of its count."""
         counters: dict[str, str] = {}
-        for index, field in enumerate(fields):
+        for field in fields:
             if isinstance(field.type, Scalar) and isinstance(count := field.type.role, Count):
-                later = {other.name: other for other in fields[index + 1 :]}
                 place = (*path, field.name, "counts")
-                if self._check_count(field, field.type, count, later, place):
-                    row = later[count.run].type
+                if self._check_count(field, field.type, count, fields, place):
+                    row = next(each.type for each in fields if each.name == count.run)
                     if count.unit != "bytes" or count.run in counters or not _is_row(row):
                         pass
                     elif count.run in asked:
@@ -113,8 +114,9 @@ class FieldBuilder:
         return [replace(field, type=row) if field.name == name else field for field in fields]
 
     def _check_count(
-        self, field: Field, scalar: Scalar, count: Count, later: Mapping[str, Field], path: Path
+        self, field: Field, scalar: Scalar, count: Count, fields: Sequence[Field], path: Path
     ) -> bool:
+        later = {each.name: each for each in fields[fields.index(field) + 1 :]}
         target = later.get(count.run)
         needs = (path[:-1], (*path[:-2], count.run))
         if target is None or not isinstance(target.type, Blob | Array | Records) or target.type.length.fixed:
@@ -128,6 +130,7 @@ class FieldBuilder:
         unit = "bytes" if isinstance(target.type, Blob) else count.unit
         most = target.type.length.maximum
         most = target.type.size_of(most) if unit == "bytes" else most
+        most += sum(each.max_size for each in fields if each.name in count.beside)
         if most > scalar.maximum and (*path[:-2], target.name) not in self._types.unbounded:
             what = f"{field.name} counts up to {scalar.maximum}, but {target.name} has up to {most} {unit}"
             self._report.error(
@@ -188,9 +191,8 @@ class FieldBuilder:
         """The fields; those without a bound are limited to the rest of the payload."""
         unbounded = {field.name for field in fields if (*path, field.name) in self._types.unbounded}
         bounded = [field for field in fields if field.name not in unbounded]
-        counters = {field.name: field.type for field in fields if isinstance(field.type, Scalar)}
         return [
-            self._filled(field, self._room(field, bounded), counters, path)
+            self._filled(field, self._room(field, bounded), fields, path)
             if field.name in unbounded
             else field
             for field in fields
@@ -201,13 +203,15 @@ class FieldBuilder:
         beside = [each for each in bounded if not exclusive(each.when, field.when)]
         return self._payload_max - greatest_size(beside)
 
-    def _filled(self, field: Field, room: int, counters: Mapping[str, Scalar], path: Path) -> Field:
+    def _filled(self, field: Field, room: int, fields: Sequence[Field], path: Path) -> Field:
         kind, place = field.type, (*path, field.name)
         assert isinstance(kind, Blob | Array | Records)
         most = kind.items_in(max(0, room))
+        counters = {each.name: each.type for each in fields if isinstance(each.type, Scalar)}
         counter = counters.get(kind.length.counted_by)
         if counter and isinstance(counter.role, Count):
-            limit = counter.maximum
+            beside = sum(each.max_size for each in fields if each.name in counter.role.beside)
+            limit = max(0, counter.maximum - beside)
             most = min(most, kind.items_in(limit) if counter.role.unit == "bytes" else limit)
         if most == 0:
             what = f"the payload has no room for {field.name}"

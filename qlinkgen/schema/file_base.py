@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, StrictBool
+from typing import Annotated
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler, StrictBool
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
@@ -34,9 +36,15 @@ class Lifetime(FileMapping):
     deprecated: Version | None = Field(default=None, description="Version since which it is not to be used")
 
 
-class OneOrMore:
+class _OneOrMore:
     """Adds the short form of a list to the JSON Schema."""
 
     @staticmethod
     def __get_pydantic_json_schema__(core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         return {"anyOf": [{"type": "string"}, handler(core)]}
+
+
+#: One name, or a list of them.
+Names = Annotated[
+    list[str], BeforeValidator(lambda value: [value] if isinstance(value, str) else value), _OneOrMore
+]

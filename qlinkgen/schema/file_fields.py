@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, StrictBool, StrictInt, Tag
 
-from qlinkgen.schema.file_base import BRANCH, Fact, FileMapping, Lifetime
+from qlinkgen.schema.file_base import BRANCH, Fact, FileMapping, Lifetime, Names
 from qlinkgen.schema.kinds import (
     AnyCondition,
     AnyRange,
@@ -106,8 +106,9 @@ class FieldSpec(Fact, Lifetime):
     default: ScalarValue | None = Field(default=None, description="Default value, in the unit")
     const: ScalarValue | None = Field(default=None, description="Always sent, and required when received")
     reserved: StrictBool = Field(default=False, description="Sent as zero (or const), ignored when received")
-    counts: str | None = Field(
-        default=None, description="Field of variable size whose length this field holds"
+    counts: Annotated[Names, Field(min_length=1)] | None = Field(
+        default=None,
+        description="Field of variable size whose length this field holds, or several whose bytes it counts",
     )
     counts_in: Literal["items", "bytes"] = Field(default="items", description="Unit of the count")
     echo: StrictBool = Field(

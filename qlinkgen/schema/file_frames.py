@@ -19,7 +19,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from qlinkgen.schema.file_base import BRANCH, Fact, FileMapping, OneOrMore
+from qlinkgen.schema.file_base import BRANCH, Fact, FileMapping, Names
 from qlinkgen.schema.file_fields import BitSpec
 from qlinkgen.schema.kinds import (
     AnyRange,
@@ -64,9 +64,6 @@ _TELLING: Final[Mapping[str, PartKind]] = {
 #: Bytes as a short form; names are in lower case.
 _HEX_PAIRS = re.compile(r"\s*(?:[0-9A-F]{2}\s*)+\Z", re.ASCII)
 
-PartNames = Annotated[
-    list[str], BeforeValidator(lambda value: [value] if isinstance(value, str) else value), OneOrMore
-]
 Directions = Annotated[dict[Literal["request", "response"], Id], Field(min_length=2)]
 
 
@@ -165,7 +162,7 @@ class PartSpec(Fact):
     shared: StrictBool = Field(default=False, description="A terminator that may begin the next frame too")
     time: Time | None = Field(default=None, description="Silence on the line that ends a frame")
     at_least: Time | None = Field(default=None, description="Its minimum at high speed")
-    counts: PartNames | None = Field(default=None, description="Part, or parts, whose bytes a length counts")
+    counts: Names | None = Field(default=None, description="Part, or parts, whose bytes a length counts")
     size: WholeRange | None = Field(default=None, description="Minimum..maximum payload size")
     trim: Annotated[TrimSpec, BeforeValidator(_TrimForms.expanded), _TrimForms] | None = Field(
         default=None, description="Bytes at the end of a payload that are not sent: zeros"

@@ -121,7 +121,8 @@ _ALL = (
         "bad-count",
         "A count names a later field of variable size in the same message, and is wide enough for it.",
         "The codec fills and verifies it. It must precede a field that takes the rest of the payload. "
-        "Bits in a row need a count of their items, as the size of the payload leaves their number open.",
+        "Bits in a row need a count of their items, as the size of the payload leaves their number open. "
+        "A count of the bytes of several fields tells the size of one; the others have a constant size.",
     ),
     Rule(
         "two-open-ends",

@@ -155,7 +155,7 @@ class ScalarBuilder:
                     "bad-width", "type", f"{base} has {plain.bits} bits", f"use 1 to {MAX_BITS} in groups"
                 )
         if spec.counts is not None:
-            return replace(scalar, role=Count(spec.counts, spec.counts_in))
+            return replace(scalar, role=Count(spec.counts[0], _count_unit(spec), tuple(spec.counts[1:])))
         scalar = quantified(scalar, spec, plain.what, location)
         key = "const" if spec.const is not None else "default"
         scalar = defaulted(scalar, getattr(spec, key), key, location)
@@ -229,6 +229,11 @@ def _covered(parts: tuple[tuple[int, int], ...], bits: int) -> bool:
     return sorted(bit for first, last in parts for bit in range(first, last + 1)) == list(range(bits))
 
 
+def _count_unit(spec: FieldSpec) -> Literal["items", "bytes"]:
+    """A count of several fields counts bytes."""
+    return spec.counts_in if len(spec.counts or ()) == 1 else "bytes"
+
+
 def _check_keys(spec: FieldSpec, plain: Plain, location: Location) -> None:
     """Report contradictory keys."""
     if spec.counts is not None:
@@ -237,6 +242,9 @@ def _check_keys(spec: FieldSpec, plain: Plain, location: Location) -> None:
         )
         if plain.meaning is not None or plain.scaling is not None:
             location.fault("bad-count", "counts", f"{plain.what} cannot count", "use an unsigned integer")
+        if len(spec.counts) > 1 and "counts_in" in location.written and spec.counts_in == "items":
+            what = "a count of several fields is a number of bytes"
+            location.key_fault("not-applicable", "counts_in", what, "remove it")
     elif "counts_in" in location.written:
         location.key_fault(
             "not-applicable", "counts_in", "'counts_in' has no effect without counts", "remove it"

@@ -135,6 +135,7 @@ class Encoder:
                     f"({local(step.run)} * {step.term.factor}U)" if step.term.factor > 1 else local(step.run)
                 )
                 number = f"((({number}) + 7U) / 8U)" if step.term.packed else number
+                number = f"({number} + {step.term.more}U)" if step.term.more else number
                 self._put(step.place, step.integer, f"({unsigned_type(step.integer.bits)}){number}")
             case BitsStep():
                 self._put(step.place, step.integer, _whole(step))

@@ -25,12 +25,14 @@ def size_text(size: Size, count: Callable[[str], str]) -> str:
 def term_text(term: Term, number: str) -> str:
     """The size of a run of so many items."""
     product = f"({term.factor}U * {number})" if term.factor > 1 else number
-    return f"(({product} + 7U) / 8U)" if term.packed else product
+    product = f"(({product} + 7U) / 8U)" if term.packed else product
+    return f"({product} + {term.more}U)" if term.more else product
 
 
 def _items_text(term: Term, size: str) -> str:
     """The number of items of a row in so many bytes."""
     times, by = term.per_byte
+    size = f"({size} - {term.more}U)" if term.more else size
     number = f"(size_t){grouped(size)}"
     number = f"({number} * {times}U)" if times > 1 else number
     return f"{number} / {by}U" if by > 1 else number
@@ -88,20 +90,23 @@ class Learner:
 
     def take(self, count: CountStep, number: str, kind: str = "") -> None:
         """Assign the number of items of the run and check it; ``kind`` declares it."""
-        integer, wide = count.integer, count.integer.bits > 16
+        integer, wide, more = count.integer, count.integer.bits > 16, count.term.more
         held, bounds = Within(0, integer.mask), count.bounds  # negative numbers are outside of them
-        if wide or count.term.packed:  # may exceed a size_t
+        early = wide or count.term.packed or more > 0  # may exceed a size_t, or be less than the bytes beside
+        if early:
             self.refuse(broken([bounds], number, held, integer.bits), "LENGTH")
         if count.term.packed:
             number = _items_text(count.term, number)
-        elif count.scale > 1:
+        else:
+            number = f"({number} - {more}U)" if more else number
+        if not count.term.packed and count.scale > 1:
             self.refuse([f"({number} % {count.scale}U) != 0U"], "LENGTH")
             number, held = f"{number} / {count.scale}U", Within(0, integer.mask // count.scale)
             bounds = Within(bounds.low // count.scale, bounds.high // count.scale)
         if wide and not count.term.packed:
             number = f"(size_t){grouped(number)}"
         self.lines.append(f"{kind}{local(count.run)} = {number};")
-        if not wide and not count.term.packed:
+        if not early:
             self.refuse(broken([bounds], local(count.run), held, 16), "LENGTH")
         self.known.append(count.run)
 

@@ -10,7 +10,7 @@ from qlinkgen.backends.c.conditions import condition, numbers_of
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.encode import Encoder
 from qlinkgen.backends.c.names import count_type, grouped
-from qlinkgen.backends.c.sizes import local, local_size, size_text
+from qlinkgen.backends.c.sizes import local, local_size, size_text, term_text
 from qlinkgen.model import naming
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.expr import Size, Within
@@ -188,7 +188,7 @@ class WalkedDecoder(Decoder):
         self._get(step.place, step.integer)
         number = self.number(step)
         if step.run in self.counted:
-            items = f"({step.scale}U * {local(step.run)})" if step.scale > 1 else local(step.run)
+            items = term_text(step.term, local(step.run))
             own = Within(0, step.integer.maximum)
             negative = checks.broken([own], number, Within(0, step.integer.mask), step.integer.bits)
             self.refuse([f"{number} != {items}", *negative], "LENGTH")

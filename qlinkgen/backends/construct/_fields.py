@@ -268,16 +268,23 @@ class Scaled(Adapter):
 class Count(Subconstruct):
     """The number of items of the field ``of``; ``step`` is the size of an item if bytes are counted.
 
-    In the bytes of a ``packed`` field an item has ``step`` bits.
+    In the bytes of a ``packed`` field an item has ``step`` bits. ``more`` bytes are counted beside them.
     """
 
     def __init__(
-        self, subcon: Construct, of: str, step: int = 1, *, packed: bool = False
+        self,
+        subcon: Construct,
+        of: str,
+        step: int = 1,
+        *,
+        packed: bool = False,
+        more: int = 0,
     ) -> None:
         super().__init__(subcon)
         self.of = of
         self.step = step
         self.packed = packed
+        self.more = more
         self.flagbuildnone = True
 
     def number(self, data: bytes) -> int:
@@ -297,7 +304,7 @@ class Count(Subconstruct):
     def told(self, items: int) -> int:
         """The number for so many items."""
         number = items * self.step
-        return (number + 7) // 8 if self.packed else number
+        return ((number + 7) // 8 if self.packed else number) + self.more
 
 
 class ArrayField(Construct):
@@ -456,9 +463,11 @@ class Message(Construct):
             told = field.subcon.number(cell) == field.subcon.told(number)
             return number if told else -1
         if field.subcon.packed:
-            number = 8 * field.subcon.number(cell) // field.subcon.step
+            own = field.subcon.number(cell) - field.subcon.more
+            number = 8 * own // field.subcon.step
             return self.runs[of].checked(number, path)
-        number, rest = divmod(field.subcon.number(cell), field.subcon.step)
+        own = field.subcon.number(cell) - field.subcon.more
+        number, rest = divmod(own, field.subcon.step)
         if rest:
             raise RangeError(
                 f"{field.name} is not a multiple of the item size of {of}", path=path

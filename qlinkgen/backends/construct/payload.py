@@ -266,7 +266,8 @@ def _count(step: CountStep) -> Call:
     term = step.term
     scale: tuple[Node, ...] = (term.factor,) if term.packed or term.factor > 1 else ()
     packed = (("packed", True),) if term.packed else ()
-    return Call("Count", (integer(step.integer), step.run, *scale), packed)
+    more = (("more", term.more),) if term.more else ()
+    return Call("Count", (integer(step.integer), step.run, *scale), packed + more)
 
 
 def _row(step: ItemsStep) -> tuple[Node, ...]:

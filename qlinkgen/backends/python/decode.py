@@ -364,7 +364,8 @@ class Decoder:
                 if sizing.count.term.packed:
                     items = integers.items_text(sizing.count.term, number)
                     return [*start, *divided(run, items, 1, self._bad_layout)]
-                return [*start, *divided(run, number, sizing.count.scale, self._bad_layout)]
+                own = integers.own_bytes(sizing.count.term, number)
+                return [*start, *divided(run, own, sizing.count.scale, self._bad_layout)]
             case Compare():
                 start, number = self._count(sizing.count)
                 return [*start, f"if {number} != {_expected(sizing.count)}:", self._bad_layout]
@@ -463,6 +464,7 @@ class Decoder:
             items = f"len({_items_of(self._tabled)})"
             factor = step.term.factor
             expected = f"{factor} * {items}" if factor > 1 else items
+            expected = f"{expected} + {step.term.more}" if step.term.more else expected
             self._sizes += [f"if {number} != {expected}:", self._bad_layout]
         elif (taken := integers.get(step.integer, local, self.place.byteorder)).stray:
             self._get(step.integer, local, at)

@@ -177,12 +177,20 @@ def term_text(term: Term) -> str:
     """The size of a run over the local variable of its count."""
     count = f"{term.run}_count"
     product = f"{term.factor} * {count}" if term.factor > 1 else count
-    return f"({product} + 7) // 8" if term.packed else product
+    product = f"({product} + 7) // 8" if term.packed else product
+    return f"{product} + {term.more}" if term.more else product
+
+
+def own_bytes(term: Term, number: str) -> str:
+    """What a count says without the bytes that it counts beside the run."""
+    number = f"({number})" if term.more and " | " in number else number
+    return f"{number} - {term.more}" if term.more else number
 
 
 def items_text(term: Term, size: str) -> str:
     """The number of items of a row in so many bytes."""
     times, by = term.per_byte
+    size = own_bytes(term, size)
     number = f"({size})" if " " in size else size
     return f"{number}{f' * {times}' if times > 1 else ''}{f' // {by}' if by > 1 else ''}"
 

@@ -41,14 +41,14 @@ def _learned(payload: PayloadPlan, count: CountStep) -> list[str]:
     number = integers.read(count.integer, "data", at)
     least, term = run.length.minimum, term_of(run)
     lines += [f"if len(data) < {at(count.integer.size)}:", "    return size"]
-    odd = ""
+    odd, own = "", integers.own_bytes(count.term, number)
     if count.term.packed:
         lines.append(f"{name} = {integers.items_text(count.term, number)}")
     elif count.scale > 1:
         odd = f"{count.run}_odd or "
-        lines.append(f"{name}, {count.run}_odd = divmod({number}, {count.scale})")
+        lines.append(f"{name}, {count.run}_odd = divmod({own}, {count.scale})")
     else:
-        lines.append(f"{name} = {number}")
+        lines.append(f"{name} = {own}")
     more = integers.term_text(term) + (f" - {term.value(least)}" if least else "")
     return [
         *lines,

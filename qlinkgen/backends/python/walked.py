@@ -235,13 +235,13 @@ class WalkedDecoder(Decoder):
     def _count_step(self, step: CountStep, at: Size) -> None:
         number = self._get(step.integer, f"{step.name}_raw", at)
         self._put_together(step.integer, number, step.name, self._offset(step))
-        run, count = self.message.payload.run(step.run), f"{step.run}_count"
+        run = self.message.payload.run(step.run)
         if step.run in self._counted_runs:
-            expected = f"{step.scale} * {count}" if step.scale > 1 else count
-            self._values += [f"if {number} != {expected}:", self._bad_layout]
+            self._values += [f"if {number} != {integers.term_text(step.term)}:", self._bad_layout]
             return
         self._counted_runs.add(step.run)
-        self._values += divided(run, number, step.scale, self._bad_layout)
+        own = integers.own_bytes(step.term, number)
+        self._values += divided(run, own, step.scale, self._bad_layout)
 
 
 def _times(run: RunStep) -> str:
@@ -319,4 +319,5 @@ def _decided(payload: PayloadPlan, step: Step, tested: set[str], known: set[str]
                 )
     else:
         known.add(step.run)
-        yield from divided(payload.run(step.run), number, step.scale, f"    return -({end})")
+        own = integers.own_bytes(step.term, number)
+        yield from divided(payload.run(step.run), own, step.scale, f"    return -({end})")

@@ -172,6 +172,7 @@ class FieldMaker:
             self._fill_words(made, taken)
         if not fixed and not room.least and self.rng.random() < self.conditional:
             self._add_conditions(made, set(begun or {}), taken)
+        self._count_several(made)
         self._name_sizes(made)
         return dict(self._dated(made, taken))
 
@@ -202,6 +203,28 @@ class FieldMaker:
             specs[counts[0]] = {**count, "range": bounds.rstrip("]")}
             specs[name] = {**spec, "type": f"{base}[{counts[0]}]"}
         made[:] = list(specs.items())
+
+    def _count_several(self, made: list[tuple[str, Any]]) -> None:
+        """Count the bytes of other fields too, where a count of bytes has room for them."""
+        rng, specs = self.rng, dict(made)
+        for at, (name, spec) in enumerate(made):
+            counting = isinstance(spec, dict) and spec.get("counts_in") == "bytes"
+            if not counting or spec["type"] != "u16" or rng.random() < 0.3:
+                continue
+            chosen = [each for each in specs if self._is_always(specs[each]) and rng.random() < 0.5]
+            several = [*chosen, spec["counts"]]
+            rng.shuffle(several)
+            made[at] = (name, {**spec, "counts": several})
+            if chosen:
+                del made[at][1]["counts_in"]
+
+    @staticmethod
+    def _is_always(spec: Any) -> bool:
+        """Whether a field is always present, with a constant size."""
+        if isinstance(spec, dict) and {"if", "optional"} & spec.keys():
+            return False
+        kind = str(spec["type"] if isinstance(spec, dict) else spec)
+        return ".." not in kind and "[]" not in kind and kind not in ("bytes", "text")
 
     def _add_conditions(self, made: list[tuple[str, Any]], kept: set[str], taken: set[str]) -> None:
         """Conditions on some fields, and optional fields at the end; `kept` fields stay as they are."""

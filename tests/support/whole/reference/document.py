@@ -195,6 +195,8 @@ class Slot:
     role: Role = "value"
     counts: str = ""
     counts_in: str = "items"
+    #: Bytes of other fields that it counts as well.
+    more: int = 0
     #: Tests of earlier values: name, ranges, whether they are excluded.
     when: tuple[Test, ...] = ()
     optional: bool = False
@@ -429,7 +431,18 @@ class Fields:
         for name, spec in _counting(fields).items():
             resolved = self._resolved(spec)
             slots.append(self._conditional(self._slot(name, resolved), resolved, slots))
-        return tuple(slots)
+        return tuple(self._counting_several(slot, fields[slot.name], slots) for slot in slots)
+
+    @staticmethod
+    def _counting_several(slot: Slot, spec: Any, slots: Sequence[Slot]) -> Slot:
+        """A count of the bytes of several fields, one of them of variable size."""
+        counted = spec.get("counts") if isinstance(spec, dict) else None
+        if not isinstance(counted, list):
+            return slot
+        (run,) = (each.name for each in slots if each.name in counted and not each.fixed)
+        more = sum(each.most_bytes for each in slots if each.name in counted and each.name != run)
+        unit = slot.counts_in if len(counted) == 1 else "bytes"
+        return replace(slot, counts=run, counts_in=unit, more=more)
 
     def _conditional(self, slot: Slot, spec: Doc, before: list[Slot]) -> Slot:
         """The slot with what decides whether it is present."""
@@ -502,7 +515,7 @@ class Fields:
             members = tuple(self._member(*each) for each in spec["bits"].items())
             return Slot(name, Packed(number.pieces, number.bits, members))
         if "counts" in spec:
-            return Slot(name, number, "count", spec["counts"], spec.get("counts_in", "items"))
+            return Slot(name, number, "count", str(spec["counts"]), spec.get("counts_in", "items"))
         number = _quantified(number, spec)
         if spec.get("reserved"):
             return Slot(name, self._with_default(number, base, spec, "const"), "reserved")
@@ -640,7 +653,7 @@ def _bounded(slot: Slot, room: int, counter: Slot | None) -> Slot:
     most = kind.items_in(max(0, room))
     if counter is not None:
         assert isinstance(counter.kind, Number)
-        limit = counter.kind.high
+        limit = counter.kind.high - counter.more
         most = min(most, kind.items_in(limit) if counter.counts_in == "bytes" else limit)
     return replace(slot, kind=replace(kind, high=max(1, most)))
 

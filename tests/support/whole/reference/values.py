@@ -122,7 +122,7 @@ def _encoded(slots: Sequence[Slot], slot: Slot, values: Mapping[str, Raw]) -> by
         assert isinstance(counted, Run | Records)
         assert not isinstance(given, int | None)
         told = counted.bytes_of(len(given)) if slot.counts_in == "bytes" else len(given)
-        return put(kind.pieces, told)
+        return put(kind.pieces, told + slot.more)
     return _put(kind, _number(kind, values[slot.name]) if slot.role == "value" else kind.default)
 
 
@@ -357,7 +357,7 @@ def _note(message: Message, slot: Slot, data: bytes, counted: dict[str, int]) ->
     raw = get(slot.kind.pieces, data)
     run = next(each.kind for each in message.slots if each.name == slot.counts)
     if isinstance(run, Run) and run.packed and slot.counts_in == "bytes" and slot.counts in counted:
-        if raw != run.bytes_of(counted[slot.counts]):
+        if raw != run.bytes_of(counted[slot.counts]) + slot.more:
             raise Wrong("length", "counts differ")
         return
     items = items_of(message, slot, raw)
@@ -369,6 +369,7 @@ def items_of(message: Message, slot: Slot, raw: int) -> int:
     """The number of items from a count. Raises Wrong if it is illegal for the field."""
     kind = next(each.kind for each in message.slots if each.name == slot.counts)
     assert isinstance(kind, Run | Records)
+    raw -= slot.more
     if kind.packed and slot.counts_in == "bytes":
         if not kind.low <= kind.items_in(raw) <= kind.most:
             raise Wrong("length", f"count {raw}")

@@ -1,0 +1,59 @@
+"""Second pass, counts over several fields: ``counts: [kind, size, value]`` is the number of their bytes.
+
+One of them has a variable size, which the count tells; the others have a constant one. The count may be one
+of them itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from qlinkgen.model.fields import Field
+from qlinkgen.model.types import Count, Scalar
+from qlinkgen.schema.file_fields import Fields
+from qlinkgen.schema.notation import shown
+from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.source import Path
+
+
+def with_beside(fields: Sequence[Field], specs: Fields, path: Path, report: Reporter) -> list[Field]:
+    """The fields; a count over several ones names the one of variable size, and the others beside it."""
+    return [_resolved(each, fields, specs, path, report) for each in fields]
+
+
+def _resolved(field: Field, fields: Sequence[Field], specs: Fields, path: Path, report: Reporter) -> Field:
+    kind = field.type
+    if not isinstance(kind, Scalar) or not isinstance(kind.role, Count) or not kind.role.beside:
+        return field
+    names, known = (kind.role.run, *kind.role.beside), {each.name: each for each in fields}
+    varying = [name for name in names if name in known and not known[name].fixed]
+    if fault := _fault(names, varying, known, specs):
+        place = (*path, field.name)
+        needs = (place, *((*path, name) for name in names))
+        report.error("bad-count", (*place, "counts"), *fault, needs=needs)
+        report.taint(place)
+        return field
+    beside = tuple(name for name in names if name != varying[0])
+    return replace(field, type=replace(kind, role=Count(varying[0], "bytes", beside)))
+
+
+def _fault(
+    names: Sequence[str], varying: Sequence[str], known: dict[str, Field], specs: Fields
+) -> tuple[str, str] | None:
+    """Error and fix for what a count names, None if it is right."""
+    for name in names:
+        if name not in known:
+            hint = did_you_mean(name, known, f"the fields are {listed(known)}")
+            return f"{shown(name)} is not a field that it can count", hint
+        if names.count(name) > 1:
+            return f"{name} is counted twice", "remove one of them"
+        if name not in varying and (specs[name].when or specs[name].optional):
+            hint = "count only fields that are always present beside the one of variable size"
+            return f"{name} may be absent, so that the count does not tell the size of another", hint
+    if not varying:
+        return "none of these fields has a variable size", "remove counts, and write the number as const"
+    if len(varying) > 1:
+        what = f"{listed(varying)} have variable sizes, which one count does not tell"
+        return what, "count one of them, and give the others counts of their own"
+    return None
