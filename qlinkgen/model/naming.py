@@ -91,10 +91,12 @@ _C_LOCALS = frozenset(
     """size payload wire capacity message value from to end check since index sent status id slave master
     listener frame checked request response body buffer start count raw sum crc payload_size
     payload_capacity total trailer covered head place broadcast context byte at direction
-    parts received size_t block out""".split()  # noqa: SIM905
+    parts received size_t block out turn due step""".split()  # noqa: SIM905
 )
 #: Members of a table of handlers other than functions.
-_C_HANDLERS = frozenset({"node", "address", "broadcast", "context", "id", "parts", "received", "replying"})
+_C_HANDLERS = frozenset(
+    {"node", "address", "broadcast", "context", "id", "parts", "received", "replying", "turn", "due"}
+)
 #: Names that the header itself defines, or their beginnings, without the prefix of the protocol.
 _C_STEMS = frozenset(
     """addressing async_master_calls async_node_calls bits bits_per bus check codec_error command crc

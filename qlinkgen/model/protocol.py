@@ -11,7 +11,7 @@ from qlinkgen.model.fields import Value
 from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame, PartBits
 from qlinkgen.model.message import Direction, Example, Message
 from qlinkgen.model.texts import Text, without_texts
-from qlinkgen.model.transaction import Bus, Command, Reply
+from qlinkgen.model.transaction import Bus, Command, Exchange, Reply, exchanges_of
 from qlinkgen.model.types import ByteOrder, Enum, Flags
 
 
@@ -121,3 +121,8 @@ class Protocol:
     def replies(self) -> Mapping[str, Reply]:
         """Answers other than responses, and responses that may refuse, by the full name of their message."""
         return {reply.message.name: reply for command in self.commands for reply in command.meant}
+
+    @cached_property
+    def exchanges(self) -> Mapping[str, Exchange]:
+        """What the master sends in transactions, by the full name of the message."""
+        return {each.sent.name: each for each in exchanges_of(self.commands)}

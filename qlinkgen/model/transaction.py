@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from types import MappingProxyType
@@ -117,8 +118,22 @@ Many = ByCount | ByField | ByReply | ByTime
 
 
 @dataclass(frozen=True, slots=True)
+class Step:
+    """A frame of a dialogue after its request."""
+
+    message: Message
+    #: The master sends it, otherwise the slave.
+    sent: bool
+    #: Time limit from the frame before it; None for the master: the slave waits until the next request.
+    within: Allowance | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Command:
-    """A transaction: a request and its response, None if it is not answered."""
+    """A transaction: a request and its response, None if it is not answered.
+
+    The response of a dialogue is the last message that the slave sends.
+    """
 
     name: str
     id: int
@@ -138,6 +153,8 @@ class Command:
     sizes: tuple[tuple[str, str], ...] = ()
     #: The end of the answers, None if there is one.
     many: Many | None = None
+    #: The frames after the request; () for a request and its response.
+    steps: tuple[Step, ...] = ()
     #: What the response means, None if it always answers the request.
     outcome: Reply | None = None
     #: Protocol-specific attributes; names and values are declared in the schema.
@@ -155,9 +172,50 @@ class Command:
 
     @property
     def messages(self) -> tuple[Message, ...]:
-        """Its request, its response and its other replies."""
-        both = (self.request,) if self.response is None else (self.request, self.response)
-        return (*both, *(reply.message for reply in self.replies))
+        """Its request, its response or the messages of its steps, and its other replies."""
+        followed = {step.message.name: step.message for step in self.steps}
+        if self.response is not None:
+            followed.setdefault(self.response.name, self.response)
+        return (self.request, *followed.values(), *(reply.message for reply in self.replies))
+
+    @property
+    def answers(self) -> tuple[Message, ...]:
+        """Its response and its other replies."""
+        response = () if self.response is None else (self.response,)
+        return (*response, *(reply.message for reply in self.replies))
+
+
+@dataclass(frozen=True, slots=True)
+class Exchange:
+    """A frame that the master sends in a transaction, and the answers to it.
+
+    ``turn`` numbers the frames of all dialogues that a slave waits for, from 1; it is 0 for a request.
+    """
+
+    command: Command
+    sent: Message
+    answers: tuple[Message, ...]
+    turn: int = 0
+    #: What the master sends next, None if that was the last frame.
+    following: Message | None = None
+
+
+def exchanges_of(commands: Iterable[Command]) -> Iterator[Exchange]:
+    """What the master sends in transactions, in its order."""
+    turn = 0
+    for command in commands:
+        if not command.steps:
+            yield Exchange(command, command.request, (command.response,) if command.response else ())
+            continue
+        sent, answers, first = command.request, list[Message](), 0
+        for step in command.steps:
+            if step.sent:
+                yield Exchange(command, sent, tuple(answers), first, step.message)
+                turn += 1
+                sent, answers, first = step.message, [], turn
+            else:
+                answers.append(step.message)
+        yield Exchange(command, sent, tuple(answers), first)
 
 
 @dataclass(frozen=True, slots=True)

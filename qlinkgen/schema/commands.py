@@ -24,6 +24,7 @@ from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.seeds import is_number
 from qlinkgen.schema.sizes import sized
 from qlinkgen.schema.source import Path
+from qlinkgen.schema.steps import Asked, StepBuilder, names_response
 
 
 def build_bus(file: SchemaFile) -> Bus:
@@ -59,6 +60,7 @@ class CommandBuilder:
         self._replies = ReplyBuilder(file, report, messages, frame)
         self._sizes: dict[str, tuple[tuple[str, str], ...]] = {}
         self._singles: dict[str, Message] = {}
+        self._steps = StepBuilder(file, report, messages, self._singles, self._sizes)
         self.messages: list[Message] = []
         self.commands: list[Command] = []
 
@@ -84,6 +86,12 @@ class CommandBuilder:
         defaults = self._file.defaults
         addressing = self._addressing(spec.addressing or defaults.addressing, path)
         request, response = self._directions(name, spec, addressing, path)
+        steps = self._steps.build(Asked(name, spec, request, response, addressing))
+        if steps:
+            response = next((step.message for step in reversed(steps) if not step.sent), response)
+            known = {message.name for message in self.messages}
+            own = {step.message.name: step.message for step in steps if step.message.command == name}
+            self.messages += [message for message in own.values() if message.name not in known]
         replies = self._other_replies(name, response, addressing)
         many = self._many(spec, request, response, replies, path)
         self.commands.append(
@@ -98,6 +106,7 @@ class CommandBuilder:
                 replies=replies,
                 sizes=self._sizes.get(name, ()),
                 many=many,
+                steps=steps,
                 outcome=self._replies.outcome(name, response),
                 in_flight=spec.in_flight or defaults.in_flight or 1,
                 doc=spec.doc,
@@ -124,7 +133,7 @@ class CommandBuilder:
         path: Path,
     ) -> Many | None:
         place = (*path, "many")
-        if spec.many is None:
+        if spec.many is None or spec.steps is not None:
             return None
         if response is None or isinstance(self._frame, PacketFrame):
             why = "it has no response" if response is None else "answers in packets have no id"
@@ -153,7 +162,7 @@ class CommandBuilder:
                 f"{name} has no request",
                 "write request: {} for one without data",
             )
-        if response is None:
+        if response is None and names_response(spec):
             hint = "write response: {} for an empty response, response: none for no response"
             self._missing("bad-response", "response", path, f"{name} has no response", hint)
         self._check_answered(addressing, response, path)
@@ -175,7 +184,7 @@ class CommandBuilder:
 
     def _response(self, spec: CommandSpec, path: Path) -> tuple[Fields | ResponseWord | None, Written]:
         """The fields or the word of the response, None if nothing states it; and the message as written."""
-        own, common = spec.response, self._file.defaults.response
+        own, common = spec.response, self._file.defaults.response if names_response(spec) else None
         given, place = (own, (*path, "response")) if own is not None else (common, ("defaults", "response"))
         fields = fields_of(given)
         number, number_path = AnswerId(0, relative=True), (*path, "id")

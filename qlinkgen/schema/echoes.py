@@ -14,7 +14,12 @@ from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
 _RULE = "bad-echo"
-_KINDS = {"request": "a request", "message": "a message without a request", "record": "a record"}
+_KINDS = {
+    "request": "a request",
+    "step": "a step before the response",
+    "message": "a message without a request",
+    "record": "a record",
+}
 
 
 def check_echoes(
@@ -31,8 +36,8 @@ def check_echoes(
                 hint = "remove it; only a field of a response can be an echo"
                 report.error(_RULE, place, f"'echo' has no effect in {what}", hint, of_key=True)
     for command in commands:
-        asked, *answers = command.messages
-        for answer in answers:
+        asked = command.request
+        for answer in command.answers:
             for field in answer.fields:
                 if field.echo and (fault := _fault(field, asked.fields)):
                     place = (*places[answer.name], field.name)

@@ -96,9 +96,9 @@ class _Checker:
             return {"fields": self._protocol.by_name[name]}
         command = next(each for each in self._protocol.commands if each.name == name)
         both = {"request": command.request, "response": command.response}
-        return {key: each for key, each in both.items() if each} | {
-            reply.name: reply.message for reply in command.replies
-        }
+        others = {reply.name: reply.message for reply in command.replies}
+        others |= {each.name.partition(".")[2]: each for each in command.messages if each.command == name}
+        return {key: each for key, each in both.items() if each} | others
 
     def _decoded(self, message: Message, spec: ExampleSpec, path: Path) -> Decoded | None:
         """What the bytes say; None if that was reported."""

@@ -28,6 +28,7 @@ from qlinkgen.schema.kinds import (
     Count,
     Id,
     Label,
+    Name,
     ShortForm,
     Text,
     TextId,
@@ -149,6 +150,48 @@ Response = Annotated[
 ]
 
 
+class StepMessageSpec(FileMapping):
+    """The long form of a message of a dialogue: its number and its fields."""
+
+    id: AnswerNumber | None = Field(default=None, description="Its number, if it is not that of the request")
+    fields: Fields = Field(description="Its fields, in wire order")
+
+
+def _step_form(value: object) -> str:
+    if isinstance(value, str):
+        return f"{BRANCH}word"
+    long = isinstance(value, StepMessageSpec) or (
+        isinstance(value, dict)
+        and value.keys() <= StepMessageSpec.model_fields.keys()
+        and (isinstance(value.get("fields"), dict) or _is_answer_id(value.get("id")))
+    )
+    return f"{BRANCH}long" if long else f"{BRANCH}fields"
+
+
+StepMessage = Annotated[
+    Annotated[Fields, Tag(f"{BRANCH}fields")]
+    | Annotated[StepMessageSpec, Tag(f"{BRANCH}long")]
+    | Annotated[str, Tag(f"{BRANCH}word")],
+    Discriminator(_step_form),
+    _AnyForm,
+]
+
+
+class StepSpec(Fact):
+    """A frame of a dialogue: exactly one of send and receive."""
+
+    name: Name | None = Field(default=None, description="Its name; default: step_ and its place in the list")
+    send: StepMessage | None = Field(
+        default=None, description="Sent by the master: request, the name of a message, or {id:, fields:}"
+    )
+    receive: StepMessage | None = Field(
+        default=None, description="Sent by the slave: response, the name of a message, or {id:, fields:}"
+    )
+    within: Time | None = Field(
+        default=None, description="Time limit; default: that of the response, and none for the master"
+    )
+
+
 def _count_form(value: object) -> object:
     """A number, or ``request.FIELD`` as the name of the field."""
     if isinstance(value, str) and (match := re.fullmatch(r"\s*request\.(\w+)\s*", value, re.ASCII)):
@@ -260,6 +303,9 @@ class CommandSpec(Fact, Lifetime):
         default_factory=dict, description="Answers other than the response; they replace those of the file"
     )
     many: ManySpec | None = Field(default=None, description="Several answers come, until this end")
+    steps: list[StepSpec] | None = Field(
+        default=None, min_length=1, description="Frames after the request, in their order: a dialogue"
+    )
     empty_request: Literal["defaults"] | None = Field(
         default=None, description="defaults: an empty payload is a request with every field at its default"
     )

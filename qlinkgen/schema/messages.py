@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import NamedTuple, assert_never
+from typing import Literal, NamedTuple, assert_never
 
 from qlinkgen.model.fields import Field, Record, Records
 from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
@@ -11,7 +11,8 @@ from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.transaction import Addressing, Bus
 from qlinkgen.model.types import Array, Bits, Blob, Chunk, Scalar
 from qlinkgen.schema.fields import FieldBuilder, is_open
-from qlinkgen.schema.file_commands import CommandSpec, MessageSpec, ReplySpec
+from qlinkgen.schema.file_base import Fact
+from qlinkgen.schema.file_commands import CommandSpec, MessageSpec
 from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.notation import StatedId
@@ -100,21 +101,29 @@ class MessageBuilder:
         repeats = direction == "response" and counter and counter.counting and counter.counting.echo
         return (counter.name,) if counter and repeats else ()
 
-    def reply(self, command: str, spec: ReplySpec, layout: Written, *, addressing: Addressing) -> Message:
-        """An answer other than the response; ``command`` is "" if it is that of all."""
-        ranges, default = self._addresses(addressing, "response")
+    def reply(
+        self,
+        command: str,
+        spec: Fact,
+        layout: Written,
+        *,
+        addressing: Addressing,
+        direction: Literal["request", "response"] = "response",
+    ) -> Message:
+        """An answer other than the response, or a step; ``command`` is "" if it is that of all."""
+        ranges, default = self._addresses(addressing, direction)
         name = f"{command}.{layout.part}" if command else layout.part
-        number = self._number(layout, "response", name)
+        number = self._number(layout, direction, name)
         message = Message(
             name=name,
             command=command or name,
-            direction="response",
+            direction=direction,
             id=number,
             fields=self._fields.build(layout.fields, layout.path),
             doc=spec.doc,
             section=spec.section,
             confirmed=spec.confirmed,
-            echoed=self._echoed("response"),
+            echoed=self._echoed(direction),
             checksum=self._has_checksum(command or name),
             addresses=ranges,
             default_address=default,

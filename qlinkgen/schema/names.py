@@ -14,11 +14,12 @@ from qlinkgen.model.types import Array, Blob, Scalar
 from qlinkgen.schema.file_fields import Fields, RecordSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import NAME_PATTERN
-from qlinkgen.schema.layouts import layouts
+from qlinkgen.schema.layouts import layouts, own_steps
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.replies import reply_messages
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
+from qlinkgen.schema.steps import step_messages
 
 #: Maximum length of a name. In C the names of protocol and message precede it and a suffix follows, and only
 #: 63 characters of an identifier are significant (C99, 5.2.4.1).
@@ -59,6 +60,7 @@ def check_names(
     for path, replies in _reply_groups(file):
         for name in replies:
             check.spelling(name, (*path, name))
+    check.steps(file)
     for layout in layouts(file):
         check.fields(layout.fields, layout.path)
     records = layouts_of(field for message in messages for field in message.fields)
@@ -122,6 +124,11 @@ class _Checker:
                         address = inner
         return address
 
+    def steps(self, file: SchemaFile) -> None:
+        for command, spec in file.commands.items():
+            for step in own_steps(command, spec):
+                self.spelling(step.name, (*step.path, "name") if step.spec.name else step.path)
+
     def fields(self, fields: Fields, path: Path) -> None:
         for name, spec in fields.items():
             self.spelling(name, (*path, name))
@@ -182,6 +189,8 @@ def _classes(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
             yield found, f"the {direction} of '{name}'", ("commands", name)
     for name, path in reply_messages(file):
         yield naming.message_class(snake(name)), f"the reply '{name}'", path
+    for name, path in step_messages(file):
+        yield naming.message_class(snake(name)), f"the step '{name}'", path
     for name in file.messages:
         yield naming.message_class(name), f"the message '{name}'", ("messages", name)
 
@@ -193,7 +202,7 @@ def records_of(file: SchemaFile) -> Iterator[str]:
 
 def _messages(file: SchemaFile) -> Iterator[str]:
     yield from (f"{name}_{direction}" for name in file.commands for direction in ("request", "response"))
-    yield from (snake(name) for name, _ in reply_messages(file))
+    yield from (snake(name) for name, _ in (*reply_messages(file), *step_messages(file)))
     yield from file.messages
 
 
@@ -205,6 +214,8 @@ def _methods(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
         yield naming.method(name), f"the message '{name}'", ("messages", name)
     for name, path in reply_messages(file):
         yield naming.method(snake(name)), f"the reply '{name}'", path
+    for name, path in step_messages(file):
+        yield naming.method(snake(name)), f"the step '{name}'", path
 
 
 def _class_base(file: SchemaFile, name: str) -> str:
@@ -245,6 +256,8 @@ def _macro_owners(
             yield f"{name}_{direction}", f"{name}.{direction}", _MESSAGE_MACROS, ("commands", name)
     for name, path in reply_messages(file):
         yield _class_base(file, snake(name)), f"the reply '{name}'", _MESSAGE_MACROS, path
+    for name, path in step_messages(file):
+        yield _class_base(file, snake(name)), f"the step '{name}'", _MESSAGE_MACROS, path
     for name in file.messages:
         yield _class_base(file, name), f"the message '{name}'", _MESSAGE_MACROS, ("messages", name)
 

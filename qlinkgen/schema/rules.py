@@ -293,6 +293,11 @@ _ALL = (
         "Without an end a master would wait for a further answer after the last one.",
     ),
     Rule(
+        "bad-steps",
+        "The steps of a dialogue follow its request in order; each is one frame, and one of them answers.",
+        "Both sides follow the same list, without loops or choices, and one request goes to one node.",
+    ),
+    Rule(
         "bad-echo",
         "An echo is a field of a response; its request has a field of the same name and type.",
         "It identifies the request that a response belongs to.",

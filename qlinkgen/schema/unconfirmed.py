@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from qlinkgen.schema.file_base import Fact
 from qlinkgen.schema.file_model import SchemaFile
-from qlinkgen.schema.layouts import layouts
+from qlinkgen.schema.layouts import layouts, own_steps
 from qlinkgen.schema.notation import type_text
 from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
@@ -44,6 +44,8 @@ def _facts(file: SchemaFile) -> Iterator[tuple[Path, str, Fact]]:
     for name, command in file.commands.items():
         for key, reply in command.replies.items():
             yield ("commands", name, "replies", key), f"{name}.{key}", reply
+        for step in own_steps(name, command):
+            yield step.path, f"{name}.{step.name}", step.spec
     for each in layouts(file):
         for name, field in each.fields.items():
             yield (*each.path, name), f"{each.owner or each.path[1]}.{name}", field

@@ -64,6 +64,10 @@ def _pruned(node: _T, version: Version | None) -> _T:
         kept = {key: _pruned(each, version) for key, each in node.items() if _lives(each, version)}
         same = len(kept) == len(node) and all(kept[key] is node[key] for key in kept)
         return node if same else kept  # type: ignore[return-value]  # fields of the model are dicts
+    if isinstance(node, list):
+        items = [_pruned(each, version) for each in node]
+        same = all(one is other for one, other in zip(items, node, strict=True))
+        return node if same else items  # type: ignore[return-value]  # fields of the model are lists
     return node
 
 
@@ -87,3 +91,6 @@ def _lifetimes(node: object, path: Path) -> Iterator[tuple[Path, Lifetime]]:
     elif isinstance(node, Mapping):
         for name, each in node.items():
             yield from _lifetimes(each, (*path, name))
+    elif isinstance(node, list):
+        for index, each in enumerate(node):
+            yield from _lifetimes(each, (*path, index))

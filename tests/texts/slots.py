@@ -71,6 +71,10 @@ def _is_table(hint: Any) -> bool:
     return getattr(hint, "__origin__", None) is dict
 
 
+def _is_list(hint: Any) -> bool:
+    return getattr(hint, "__origin__", None) is list
+
+
 def _is_text(hint: Any) -> bool:
     return hint in (kinds.Text, kinds.Label)
 
@@ -91,7 +95,15 @@ def _write_out(data: Any, hint: Any) -> Any:
     if isinstance(data, dict):
         for key, inner in _members(data, hint):
             data[key] = _write_out(data[key], inner)
+    if isinstance(data, list):
+        return [_write_out(each, _item(hint)) for each in data]
     return data
+
+
+def _item(hint: Any) -> Any:
+    """The annotation of the items of a list."""
+    found = _first(hint, _is_list)
+    return typing.get_args(found)[0] if found is not None else None
 
 
 def _members(data: Mapping[str, Any], hint: Any) -> Iterator[tuple[str, Any]]:
@@ -148,6 +160,9 @@ def _slots(data: Any, hint: Any, path: tuple[str | int, ...], kind: Kind) -> Ite
     elif isinstance(data, list):
         if any(map(_is_text, _parts(hint))):
             yield from (Slot((*path, index), kind) for index in range(len(data)))
+        else:
+            for index, each in enumerate(data):
+                yield from _slots(each, _item(hint), (*path, index), kind)
     elif isinstance(data, dict):
         model = _model_of(data, hint)
         members = dict(_members(data, hint))

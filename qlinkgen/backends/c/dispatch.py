@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from qlinkgen.backends.c.framing import Address, Expected, expected
@@ -10,7 +10,7 @@ from qlinkgen.backends.c.names import Names, count_type
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import handler, member, snake
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.transaction import Allowance, Bus, Command, Repeat
+from qlinkgen.model.transaction import Allowance, Bus, Command, Exchange, Repeat
 from qlinkgen.plan.tree import MessagePlan
 
 
@@ -37,6 +37,7 @@ class SlaveEntry:
         unless_silent: term of a condition that prevents a response to a broadcast.
         replies: functions of other answers.
         sizes: number of items of a field of the response, and the expression with which it begins.
+        turn: its number in a dialogue, 0 if it begins a transaction; ``following`` is that of the next frame.
     """
 
     name: str
@@ -54,6 +55,8 @@ class SlaveEntry:
     unless_silent: str
     replies: list[str]
     sizes: list[tuple[str, str]]
+    turn: str
+    following: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,16 +102,40 @@ class Transaction:
     in_flight: int
 
 
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A frame of a dialogue that a slave waits for."""
+
+    constant: str
+    number: int
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class DialogueEntry:
+    """The frames of a dialogue, for a master: name and number of each, and the ids of its messages."""
+
+    name: str
+    command: str
+    steps: list[tuple[str, str]]
+
+
 def slave_entries(
-    names: Names, kept: tuple[Message, ...], *, addressed: bool, reject: str
+    names: Names,
+    kept: tuple[Message, ...],
+    exchanges: Mapping[str, Exchange],
+    *,
+    addressed: bool,
+    reject: str,
 ) -> list[SlaveEntry]:
     """Requests to a slave, in schema order; ``reject`` is the function that rejects, "" if there is none."""
     present = {message.name for message in kept}
     entries = []
     for message in kept:
         if message.direction != "response":
-            command = names.command_of(message)
-            answer = command.response if command and command.response else None
+            exchange = exchanges.get(message.name)
+            command = exchange.command if exchange else None
+            answer = exchange.answers[0] if exchange and exchange.answers else None
             answer = answer if answer and answer.name in present else None
             # A message without a command goes to one node.
             addressing = command.addressing if command else "node"
@@ -117,7 +144,15 @@ def slave_entries(
             )
             replies = [names.function(each) for each in others] if answer else []
             entries.append(
-                _entry(names, message, answer, addressing if addressed else "", reject, replies=replies)
+                _entry(
+                    names,
+                    message,
+                    answer,
+                    addressing if addressed else "",
+                    reject,
+                    replies=replies,
+                    exchange=exchange,
+                )
             )
     return entries
 
@@ -142,7 +177,9 @@ def _entry(
     reject: str,
     *,
     replies: list[str],
+    exchange: Exchange | None,
 ) -> SlaveEntry:
+    following = exchange.following if exchange else None
     function, answer_constant = names.function(message), names.constant(answer) if answer else ""
     target = "&request, " if message.values else ""
     decoded = f"{function}_decode({target}frame->payload, frame->size) == {names.upper}_OK"
@@ -163,6 +200,8 @@ def _entry(
         unless_silent=" && !slave->broadcast" if answer and addressing == "either" else "",
         replies=replies,
         sizes=_sizes(names.command_of(message)) if answer else [],
+        turn=turn_name(names, message) if exchange and exchange.turn else "",
+        following=turn_name(names, following) if following else "",
     )
 
 
@@ -173,6 +212,37 @@ def _sizes(command: Command | None) -> list[tuple[str, str]]:
         (f"{name}_{fields[name].quantity}", f"({count_type(fields[name].most)})request.{member(asked)}")
         for name, asked in (command.sizes if command else ())
         if not fields[name].fixed
+    ]
+
+
+def turn_name(names: Names, message: Message) -> str:
+    """The constant for the turn of a frame."""
+    return f"{names.constant(message)}_TURN"
+
+
+def turns(names: Names, exchanges: Iterable[Exchange], kept: Iterable[Message]) -> list[Turn]:
+    """The frames of dialogues that a slave waits for."""
+    present = {message.name for message in kept}
+    return [
+        Turn(turn_name(names, each.sent), each.turn, each.sent.name)
+        for each in exchanges
+        if each.turn and each.sent.name in present
+    ]
+
+
+def dialogues(names: Names, commands: Iterable[Command]) -> list[DialogueEntry]:
+    """The frames of each dialogue in their order."""
+    return [
+        DialogueEntry(
+            f"{names.prefix}_{snake(command.name)}",
+            command.name,
+            [
+                (message.name, f"{names.constant(message)}_ID")
+                for message in (command.request, *(step.message for step in command.steps))
+            ],
+        )
+        for command in commands
+        if command.steps
     ]
 
 

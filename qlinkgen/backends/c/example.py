@@ -38,10 +38,11 @@ def example_lines(plan: Plan, names: Names, section: FrameSection) -> list[str]:
     """A slave if the header has one, otherwise a master or a listener."""
     if plan.protocol.directions == ("message",):
         return _listener(names, section, plan.messages[0], "listener")
+    exchanges = (plan.protocol.exchanges[command.request.name] for command in plan.commands)
     pairs = [
-        (command, plan.by_name[command.request.name], plan.by_name[command.response.name])
-        for command in plan.commands
-        if command.response and command.response.name in plan.by_name
+        (each.command, plan.by_name[each.sent.name], plan.by_name[each.answers[0].name])
+        for each in exchanges
+        if each.answers and each.answers[0].name in plan.by_name
     ]
     if plan.role != "master" and pairs:
         return _slave(names, section, *max(pairs, key=lambda pair: _weight(*pair[1:])))

@@ -236,12 +236,20 @@ class Header:
             slave_groups=dispatch.slave_groups(slave, self._names.prefix),
             master=dispatch.callbacks(self._names, self._address, self._plan.messages) if listens else [],
             transactions=dispatch.transactions(self._protocol, self._names.upper, commands),
+            turns=dispatch.turns(self._names, self._protocol.exchanges.values(), self._kept),
+            dialogues=dispatch.dialogues(self._names, commands) if listens else [],
         )
 
     def _slave(self) -> list[dispatch.SlaveEntry]:
         section = self._section
         addressed = bool(section.view.address)
-        return dispatch.slave_entries(self._names, self._kept, addressed=addressed, reject=section.reject)
+        return dispatch.slave_entries(
+            self._names,
+            self._kept,
+            self._protocol.exchanges,
+            addressed=addressed,
+            reject=section.reject,
+        )
 
     def _replies(self, slave: Sequence[dispatch.SlaveEntry]) -> list[dispatch.ReplyEntry]:
         """Functions that answer in another way, if any function of the slave may."""

@@ -57,6 +57,7 @@ class Entry:
         tests: their number; ``handler_tests`` and ``callback_tests`` are those of slave and listener.
         slave_member: the member of the slave's struct that handles it, "" if none does.
         callback_member: the member of the listener's struct that receives it, "" if none does.
+        turn: the number of the frame in dialogues, 0 if it is not a later one.
     """
 
     number: int
@@ -84,6 +85,7 @@ class Entry:
     slave_member: str
     callback_member: str
     answer: Answer | None
+    turn: int
 
     @property
     def entry_lines(self) -> list[str]:
@@ -147,8 +149,8 @@ class Entries:
         return bool(self._header.listener) and listens and message.direction != "request"
 
     def _answer(self, message: MessagePlan) -> Answer | None:
-        header, command = self._header, self._plan.protocol.command_of(message.message)
-        answer = command.response if command else None
+        header, exchange = self._header, self._plan.protocol.exchanges.get(message.name)
+        answer = exchange.answers[0] if exchange and exchange.answers else None
         if answer is None or answer.name not in self._numbers:
             return None
         stem, number = naming.member(header.stem(answer)), self._numbers[answer.name]
@@ -196,6 +198,7 @@ class Entries:
             slave_member=header.slave_member(message) if handled else "",
             callback_member=header.callback_member(message) if called else "",
             answer=self._answer(plan) if handled else None,
+            turn=exchange.turn if (exchange := self._plan.protocol.exchanges.get(plan.name)) else 0,
         )
 
     def _tests(self, plan: MessagePlan, rows: Sequence[Row], found: Stream | None) -> int:

@@ -755,6 +755,8 @@ class Command:
         many: end of several answers, None if there is one.
         sizes: fields of the response, those of the request with their number of items, and the bits of
             an item if the count of bytes does not tell that number, otherwise 0.
+        steps: frames of a dialogue after its request: who sends it (send: the master), its class, and its
+            time limit in byte times and seconds, None without one.
         replies: answers other than the response, by class.
         in_flight: maximum number of outstanding requests.
         section: section of the source document.
@@ -766,7 +768,7 @@ class Command:
         "addressing", "attributes", "confirmed", "echoes", "id", "in_flight", "many", "name",
         "repeat_counter",
         "repeat_safe", "replies", "request", "response", "response_byte_times", "response_seconds", "section",
-        "sizes",
+        "sizes", "steps",
     )  # fmt: skip
 
     def __init__(
@@ -784,6 +786,7 @@ class Command:
         echoes: tuple[str, ...] = (),
         many: Many | None = None,
         sizes: tuple[tuple[str, str, int], ...] = (),
+        steps: tuple[tuple[str, MessageClass, tuple[float, float] | None], ...] = (),
         replies: tuple[OtherReply, ...] = (),
         in_flight: int = 1,
         section: str = "",
@@ -802,6 +805,7 @@ class Command:
         self.echoes = echoes
         self.many = many
         self.sizes = sizes
+        self.steps = steps
         by_class = {each.message: each for each in replies}
         self.replies: Mapping[MessageClass, OtherReply] = by_class
         self.in_flight = in_flight

@@ -12,7 +12,18 @@ from qlinkgen.backends import python_text
 from qlinkgen.backends.python.layout import WIDTH, in_hex, wrapped
 from qlinkgen.backends.python.names import attribute, class_name
 from qlinkgen.model.texts import one_line
-from qlinkgen.model.transaction import Allowance, Bus, ByCount, ByField, ByReply, ByTime, Command, Many, Reply
+from qlinkgen.model.transaction import (
+    Allowance,
+    Bus,
+    ByCount,
+    ByField,
+    ByReply,
+    ByTime,
+    Command,
+    Many,
+    Reply,
+    Step,
+)
 from qlinkgen.model.types import Array, Enum, Flags, NamedValue
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -119,10 +130,19 @@ def _answers(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
     ]
     if sizes:
         arguments.append(f"sizes={_tuple(sizes)}")
+    steps = [_step(each, kept[each.message.name]) for each in command.steps]
+    if steps:
+        arguments.append(f"steps={_tuple(steps)}")
     replies = [_reply(each, kept[each.message.name]) for each in command.meant if each.message.name in kept]
     if replies:
         arguments.append(f"replies={_tuple(replies)}")
     return arguments
+
+
+def _step(step: Step, planned: MessagePlan) -> str:
+    """A frame of a dialogue: who sends it, its class, and its time limit."""
+    within = "None" if step.within is None else _time(step.within)
+    return f'("{"send" if step.sent else "receive"}", {class_name(planned)}, {within})'
 
 
 def _row_bits(command: Command, name: str) -> int:

@@ -237,6 +237,64 @@ class _Maker:
             number = self._answer_id(shape, asked, used, relative=rng.random() < 0.5)
             if number is not None:
                 spec["replies"] = {self.words.name(taken): self._reply(shape, maker, number)}
+        if shape.kind != "marked" and shape.bus == "master_slave" and rng.random() < 0.5:
+            self._dialogue(shape, maker, found, used)
+
+    def _dialogue(self, shape: Shape, maker: FieldMaker, found: Doc, used: set[tuple[str, int]]) -> None:
+        """Let one command be a dialogue of several frames."""
+        rng = self.rng
+        fit = [each for each in found["commands"].values() if self._may_have_steps(each)]
+        if not fit:
+            return
+        command = rng.choice(fit)
+        taken = {"request", "response", *found.get("replies", {}), *command.get("replies", {})}
+        sent = [name for name, each in found["messages"].items() if each.get("direction") == "response"]
+        steps = [{"send": "request"}] if rng.random() < 0.3 else []
+        keys = [rng.choice(("send", "receive", "receive")) for _ in range(rng.randint(1, 4))]
+        for key in [*keys, "receive"]:
+            if key == "receive" and sent and rng.random() < 0.3:
+                steps.append({key: rng.choice(sent)})
+                continue
+            step = self._step(shape, maker, command["id"], key, used)
+            if step is not None and rng.random() < 0.5:
+                step = {"name": self.words.name(taken), **step}
+            steps += [self._described(step)] if step is not None else []
+        self._last(command, steps)
+        if any("receive" in step for step in steps):
+            command["steps"] = steps
+        elif "response" not in command:
+            command["response"] = "none"
+
+    @staticmethod
+    def _may_have_steps(command: Doc) -> bool:
+        addressed = command.get("addressing", "node") == "node"
+        one = "many" not in command and command.get("in_flight", 1) == 1
+        return addressed and one and command["response"] != "none"
+
+    def _step(
+        self, shape: Shape, maker: FieldMaker, asked: Any, key: str, used: set[tuple[str, int]]
+    ) -> Doc | None:
+        """A frame with an id of its own, None if none is free."""
+        rng = self.rng
+        direction = "request" if key == "send" else "response"
+        numbers = [shape.number(asked)]
+        number = self._answer_id(shape, numbers, used, relative=rng.random() < 0.3, direction=direction)
+        if number is None:
+            return None
+        step: Doc = {key: {"id": number, "fields": maker.fields(Room.of(shape))}}
+        return step | ({"within": rng.choice(("20 ms", "5 bytes"))} if rng.random() < 0.3 else {})
+
+    def _last(self, command: Doc, steps: list[Doc]) -> None:
+        """Put the response of a command at its place among the steps, or leave it out."""
+        response = command["response"]
+        short = isinstance(response, dict) and not response.keys() & {"id", "fields", "means"}
+        if short and self.rng.random() < 0.4:
+            del command["response"]
+            steps.append({"receive": response})
+        elif self.rng.random() < 0.5:
+            steps.append({"receive": "response"})
+        elif any("receive" in step for step in steps):
+            del command["response"]
 
     def _more_of(self, shape: Shape, command: Doc) -> None:
         """Several answers, or one of a size that the request says."""
@@ -271,7 +329,13 @@ class _Maker:
         return {self.words.name({value}): size, value: row}
 
     def _answer_id(
-        self, shape: Shape, asked: list[int], used: set[tuple[str, int]], *, relative: bool
+        self,
+        shape: Shape,
+        asked: list[int],
+        used: set[tuple[str, int]],
+        *,
+        relative: bool,
+        direction: str = "response",
     ) -> int | Doc | str | None:
         """A number for the answers to requests that no other message has."""
         top = (1 << shape.id_bits) - 1
@@ -279,7 +343,7 @@ class _Maker:
             number = self.rng.randint(-top if relative else 0, top)
             number = number if relative else shape.fit(number)
             numbers = {number + each for each in asked} if relative else {number}
-            taken = {("response", each) for each in numbers}
+            taken = {(direction, each) for each in numbers}
             if not taken & used and all(0 <= each <= top and each != shape.end_id for each in numbers):
                 used |= taken
                 if not relative:

@@ -310,6 +310,8 @@ class Message:
 
 def _newest(node: Any) -> Any:
     """What the newest version of the protocol has."""
+    if isinstance(node, list):
+        return [_newest(each) for each in node]
     if not isinstance(node, dict):
         return node
     return {
@@ -715,6 +717,7 @@ def messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, .
         defaults = document.get("defaults", {})
         merged = {**defaults, **spec, "response": _answer(spec.get("response"), defaults.get("response"))}
         found += _of_command(name, merged, document, fields, addressed)
+        found += _steps(name, merged, document, fields, addressed)
         found += _replies(name, merged, document, fields, {each.name for each in found}, addressed=addressed)
     nodes = _nodes(document) if addressed else None
     for name, spec in document.get("messages", {}).items():
@@ -736,6 +739,8 @@ def _of_command(name: str, spec: Doc, document: Doc, fields: Fields, addressed: 
     both: tuple[Direction, ...] = ("request", "response")
     for direction in both:
         if isinstance(spec[direction], str):  # none, or the name of a message
+            continue
+        if direction == "response" and not _responds(spec):
             continue
         ranges, default = (
             _addresses(spec.get("addressing", "node"), direction, document) if addressed else ((), 0)
@@ -759,6 +764,34 @@ def _of_command(name: str, spec: Doc, document: Doc, fields: Fields, addressed: 
             empty,
             _checked(document, name),
         )
+
+
+def _responds(spec: Doc) -> bool:
+    """Whether a command has a response of its own; a dialogue has one if a step names it."""
+    return "steps" not in spec or any(step.get("receive") == "response" for step in spec["steps"])
+
+
+def _steps(name: str, spec: Doc, document: Doc, fields: Fields, addressed: bool) -> Iterator[Message]:
+    """The messages of a dialogue that steps describe."""
+    steps = spec.get("steps", [])
+    last = max((index for index, step in enumerate(steps) if "receive" in step), default=None)
+    nodes = (_nodes(document),) if addressed else ()
+    for index, step in enumerate(steps):
+        key = "send" if "send" in step else "receive"
+        if isinstance(step[key], str):
+            continue
+        direction: Direction = "request" if key == "send" else "response"
+        written = _long(step[key])
+        number = _number(document, written.get("id"), spec.get("id"), direction)
+        given = written["fields"]
+        if index == last:
+            asked = {value: each for slot in fields.build(spec["request"]) for value, each in _numbers(slot)}
+            given = {each: _from_request(kind, asked) for each, kind in given.items()}
+        slots = fields.build(given)
+        slots = tuple(_whole(slot, slots) for slot in slots) if index == last else slots
+        full = f"{name}.{step.get('name', f'step_{index + 1}')}"
+        default = nodes[0][0] if nodes else 0
+        yield Message(full, number, direction, slots, nodes, default, checked=_checked(document, name))
 
 
 def _numbers(slot: Slot) -> Iterator[tuple[str, Number]]:
@@ -801,12 +834,12 @@ def _long(given: Any) -> Doc:
     return dict(given) if is_long else {"fields": given}
 
 
-def _number(document: Doc, given: Any, asked: Any) -> int:
-    """The number of an answer; `given` is None if it is that of the request."""
+def _number(document: Doc, given: Any, asked: Any, direction: Direction = "response") -> int:
+    """The number of an answer or a step; `given` is None if it is that of the request."""
     if given is not None and not str(given).startswith("request"):
-        return numbered(document, given, "response")
+        return numbered(document, given, direction)
     offset = str(given or "").replace(" ", "").removeprefix("request.id")
-    return numbered(document, asked, "response") + int(offset or "0", 0)
+    return numbered(document, asked, direction) + int(offset or "0", 0)
 
 
 def _relative(number: Any) -> bool:
@@ -820,7 +853,7 @@ def _replies(
     """Answers other than the response; one with a number for all commands is one message."""
     own = spec.get("replies", {})
     common = {key: each for key, each in document.get("replies", {}).items() if key not in own}
-    if spec["response"] == "none":
+    if spec["response"] == "none" and "steps" not in spec:
         return
     for key, reply in (*common.items(), *own.items()):
         shared = key in common and not _relative(reply.get("id"))
