@@ -13,6 +13,8 @@ import pytest
 from tests.cli.conftest import Run
 
 REPOSITORY = Path(__file__).resolve().parents[2]
+#: Files of a package beside its codecs.
+SHARED = ("__init__.py", "_checks.py", "_support.py", "py.typed")
 
 
 @pytest.fixture
@@ -135,7 +137,7 @@ def test_bus_modules_are_in_the_package_of_the_codecs(qlinkgen: Run, out: Path) 
     assert qlinkgen("generate", "qlink", "-o", out).code == 0
     assert qlinkgen("generate", "trio", "-o", out).code == 0
     folder = out / "python/codecs"
-    assert files(folder) == {"__init__.py", "_support.py", "py.typed", "qlink.py", "qlink_bus.py", "trio.py"}
+    assert files(folder) == {*SHARED, "qlink.py", "qlink_bus.py", "trio.py"}
     (folder / "qlink_bus.py").write_text("spoilt")
     result = qlinkgen("generate", "qlink", "-o", out, "--check")
     assert (result.code, "codecs/qlink_bus.py: differs" in result.out) == (1, True)

@@ -15,6 +15,11 @@ from _operator import index
 from struct import Struct
 from struct import error as struct_error
 
+from ._checks import (
+    Checksum,
+    find_crc,
+    wrong_check,
+)
 from ._support import (
     REFUSALS,
     UNREAD,
@@ -23,7 +28,6 @@ from ._support import (
     BaseMessage,
     Bus,
     BytesRule,
-    Checksum,
     CodecError,
     Command,
     Counters,
@@ -37,11 +41,9 @@ from ._support import (
     Scale,
     ScaledRule,
     as_bytes,
-    find_crc,
     illegal,
     named,
     settled,
-    wrong_check,
     wrong_size,
 )
 

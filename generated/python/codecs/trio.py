@@ -16,11 +16,15 @@ from decimal import Decimal
 from struct import Struct
 from struct import error as struct_error
 
+from ._checks import (
+    Checksum,
+    find_crc,
+    wrong_check,
+)
 from ._support import (
     REFUSALS,
     BaseMessage,
     Bus,
-    Checksum,
     CodecError,
     Command,
     Counters,
@@ -36,12 +40,10 @@ from ._support import (
     ScaledRule,
     TextRule,
     as_bytes,
-    find_crc,
     illegal,
     named,
     refused,
     settled,
-    wrong_check,
     wrong_size,
 )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import jinja2
@@ -29,11 +29,15 @@ from qlinkgen.plan.tree import Plan
 _PUBLIC = ("Bus", "CodecError", "Command", "Counters", "DecodeError", "EncodeError", "Fault")
 #: Names of struct and of other modules; all others are imported from the support module.
 _STRUCT = ("Struct", "pack", "unpack", "unpack_from")
-_RULES = ("FloatRule", "ListRule", "PaddedRule")
 _RECORD = "BaseRecord"
-_RECORDS = (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records")
-_WALKS = ("MaybeRule", "Misplaced", "NEW", "misplaced")
-_ELSEWHERE = ("Decimal", "index", *_STRUCT, *_RULES, *_RECORDS, *_WALKS)
+#: Modules that are written only where used, in the order of their names.
+_SHARED: Mapping[str, Sequence[str]] = {
+    "_checks": ("Checksum", "adler", "crc", "find_crc", "fletcher", "sum_of", "wrong_check", "xor_of"),
+    "_records": (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records"),
+    "_rules": ("FloatRule", "ListRule", "PaddedRule"),
+    "_rwalks": ("MaybeRule", "Misplaced", "NEW", "misplaced"),
+}
+_ELSEWHERE = {"Decimal", "index", *_STRUCT, *(name for names in _SHARED.values() for name in names)}
 
 
 def render(plan: Plan) -> str:
@@ -66,10 +70,7 @@ class Imports:
     binascii: bool
     decimal: bool
     index: bool
-    rules: Sequence[str]
-    support: Sequence[str]
-    records: Sequence[str]
-    walks: Sequence[str]
+    modules: Mapping[str, Sequence[str]]
     callable: bool
     typing: Sequence[str]
 
@@ -203,16 +204,15 @@ class Module:
             typing -= set() if plan.enums else {"ClassVar"}
         if isinstance(view, PacketView) and not plan.enums:
             typing -= {"ClassVar"}
+        shared = {module: used & {*names} for module, names in _SHARED.items()}
+        shared["_support"] = used - _ELSEWHERE
         return Imports(
             struct=[name for name in _STRUCT if name in used],
             struct_error=True,
             binascii=_has_digits(plan),
             decimal="Decimal" in used,
             index="index" in used,
-            rules=[name for name in _RULES if name in used],
-            support=sorted(used - set(_ELSEWHERE), key=imported),
-            records=sorted(used & set(_RECORDS), key=imported),
-            walks=sorted(used & set(_WALKS), key=imported),
+            modules={module: sorted(names, key=imported) for module, names in shared.items() if names},
             callable=isinstance(view, UniqueView),
             typing=sorted(typing),
         )
