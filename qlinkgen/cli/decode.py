@@ -38,7 +38,9 @@ _COMMENT = re.compile(rb"#[^\n]*")
 @click.option(
     "--direction", type=click.Choice(["request", "response"]), help="Direction of the frames; see above."
 )
-@click.option("--request", "request", metavar="HEX", help="Packets: the request of the responses.")
+@click.option(
+    "--request", "request", metavar="HEX", help="The request of the responses, where these depend on it."
+)
 @click.option("--raw", is_flag=True, help="Standard input is binary, not hex text.")
 @crc_option
 @version_option
@@ -86,10 +88,12 @@ def _stream(
     if direction and direction not in protocol.directions:
         raise Failure(f"{protocol.name} has neither requests nor responses; omit --direction {direction}")
     packets = frame_plan(protocol.frame).needs_request
-    if request is not None and not (packets and direction != "request"):
-        raise Failure("--request requires responses of a packet protocol; omit it")
+    told = packets or protocol.carrier is not None
+    if request is not None and not (told and direction != "request"):
+        raise Failure("--request requires responses that only their request tells apart; omit it")
     if not packets or direction == "request":
-        return open_stream(protocol, codec, direction)
+        first = None if request is None else asked(protocol, codec, request)
+        return open_stream(protocol, codec, direction, first)
     if direction is None and request is None:
         return Conversation(protocol, codec)
     return Answers(protocol, codec, asked(protocol, codec, request))
@@ -171,6 +175,8 @@ def message_record(protocol: Protocol, found: Message) -> dict[str, Json]:
     for value in protocol.beside(message):
         record[record_key(value.name)] = to_json(value, getattr(found, attribute(value.name)))
     record["fields"] = fields(message, found)
+    if message.carries:
+        record["request_seen"] = False
     reply = protocol.replies.get(message.name)
     if reply is not None and means(reply, found) == "refused":
         record["refused"] = True

@@ -68,11 +68,15 @@ def explained(
     """Return the frames in the bytes, in order, and notes on them."""
     if not plan.frame.needs_request:
         if request is not None:
-            raise Failure("--request requires a packet protocol; omit it")
+            if plan.carrier is None or direction == "request":
+                raise Failure("--request requires responses that only their request tells apart; omit it")
+            _check_request(plan, request, ("",))
+            told = dissect(plan, data, "response", request)
+            return [told], notes(told)
         found, hint = _guessed(plan, data, [direction] if direction else plan.protocol.directions)
         return [found], [*hint, *notes(found)]
     if request is not None:
-        _check_request(plan, request)
+        _check_request(plan, request, ("", "range"))  # a device answers values out of range
         found = dissect(plan, data, "response", request)
         return [found], notes(found)
     if direction == "response":
@@ -83,11 +87,12 @@ def explained(
     return [asked, *answers], [note for each in answers for note in notes(each)]
 
 
-def _check_request(plan: Plan, request: bytes) -> None:
-    """Refuse bytes that are not a request; accept values out of range, which the device answers."""
+def _check_request(plan: Plan, request: bytes, kinds: Sequence[str]) -> None:
+    """Refuse bytes that are not a request, except for faults of some kinds."""
     kind = dissect(plan, request, "request").kind
-    if kind not in ("", "range"):
-        raise Failure(f"--request {request.hex()} is not a request ({kind}); give command byte and words")
+    if kind not in kinds:
+        what = "command byte and words" if plan.frame.needs_request else "a whole frame"
+        raise Failure(f"--request {request.hex()} is not a request ({kind}); give {what}")
 
 
 def _guessed(plan: Plan, data: bytes, ways: Sequence[Direction]) -> tuple[Dissection, list[str]]:

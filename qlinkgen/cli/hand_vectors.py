@@ -17,6 +17,7 @@ from qlinkgen.cli.common import find_message
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import Json
+from qlinkgen.plan.framing import frame_plan
 
 _ADDRESSES: tuple[Literal["node"], Literal["address"]] = ("node", "address")
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -116,12 +117,13 @@ def _mismatch(protocol: Protocol, codec: ModuleType, row: Vector) -> str:
     built = build(codec, message, {**beside, **row["fields"]}, given, protocol.beside(message))
     request = [codec.decode_request(bytes.fromhex(row["request"]))] if "request" in row else []
     payload, wire = bytes.fromhex(row["payload"]), bytes.fromhex(row["wire"])
+    packets = frame_plan(protocol.frame).needs_request
     if row.get("decode_only"):
         found = _decode(codec, message.direction, wire, request)
         return "" if found == built else f"its bytes are {found}"
     for what, made, expected in (
         ("payload", built.to_bytes(), payload),
-        ("frame", built.to_frame(*request), wire),
+        ("frame", built.to_frame(*(request if packets else ())), wire),
     ):
         if made != expected:
             return f"its {what} is {made.hex(' ').upper()} now"

@@ -158,6 +158,42 @@ class EitherWay:
         return events
 
 
+class Told:
+    """A stream whose answers that only their request tells apart have the message that it asked for."""
+
+    def __init__(self, stream: Stream, codec: ModuleType, request: MessageObject | None = None) -> None:
+        """``request`` is the first one, if it is not in the stream."""
+        self._stream = stream
+        self._codec = codec
+        self._request = request
+
+    def feed(self, data: bytes) -> Iterator[Event]:
+        """Take bytes."""
+        return map(self._told, self._stream.feed(data))
+
+    def finish(self) -> Iterator[Event]:
+        """The end of the stream."""
+        return map(self._told, self._stream.finish())
+
+    def _told(self, event: Event) -> Event:
+        if isinstance(event, Bad):
+            return event
+        if any(type(event) is command.request for command in self._codec.COMMANDS.values()):
+            self._request = event
+        elif self._request is not None and self._answers(self._request, event):
+            try:
+                found: MessageObject = self._codec.answer_to(self._request, event)
+            except self._codec.DecodeError:
+                return event
+            return found
+        return event
+
+    def _answers(self, request: MessageObject, event: MessageObject) -> bool:
+        """Whether the node that a request asks sends an answer."""
+        asked = address_of(request)
+        return asked in (address_of(event), self._codec.BUS.broadcast)
+
+
 def _bad(fault: Fault, base: int = 0) -> Bad:
     return Bad(fault.kind, fault.offset + base, bytes(fault.raw), fault.message)
 
@@ -177,8 +213,15 @@ def _transaction(message: Message | None) -> tuple[str, int | None] | None:
     return None if message is None else (message.NAME.rpartition(".")[0], address_of(message))
 
 
-def open_stream(protocol: Described, codec: ModuleType, direction: Direction | None) -> Stream:
-    """Return a stream for a protocol with frames."""
+def open_stream(
+    protocol: Described, codec: ModuleType, direction: Direction | None, request: MessageObject | None = None
+) -> Stream:
+    """Return a stream for a protocol with frames; ``request`` is what the first answers answer."""
+    stream = _opened(protocol, codec, direction)
+    return stream if protocol.carrier is None else Told(stream, codec, request)
+
+
+def _opened(protocol: Described, codec: ModuleType, direction: Direction | None) -> Stream:
     if protocol.directions == ("message",):
         return OneWay(codec, "message")
     if direction:

@@ -22,6 +22,7 @@ from collections.abc import Mapping
 
 from qlinkgen.errors import BadReply, Collision, LinkError, NoReply
 from qlinkgen.errors import Refused as RequestRefused
+from qlinkgen.link.asked import AskedDecoder, answer_to
 from qlinkgen.link.attempts import Attempts
 from qlinkgen.link.codec import Codec, Fault, Framed, OtherReply, address_getter, cut, is_message, reason_of
 from qlinkgen.link.counters import LinkCounters
@@ -97,7 +98,10 @@ class MasterEngine:
             command.request: CommandTiming(command, timing, hooks.get(name))
             for name, command in codec.COMMANDS.items()
         }
-        self._decoder = codec.StreamDecoder("response")
+        answers = answer_to(codec)
+        self._decoder = (
+            codec.StreamDecoder("response") if answers is None else AskedDecoder(codec, answers, self._asked)
+        )
         self._address = address_getter(codec)
         self._numbering = numbering_of(codec)
         self._byte_time = timing.byte_time
@@ -344,6 +348,12 @@ class MasterEngine:
             self._damaged(event, now)
         elif not (self._state is WAITING and now >= self._earliest and self._other_reply(event, now)):
             self._stray(event, now)
+
+    def _asked(self, message: Framed) -> Framed | None:
+        """The request that a message may answer, None without one."""
+        if self._state is WAITING and self._pending.from_asked(self._address(message)):
+            return self._pending.request
+        return None
 
     def _other_reply(self, message: Framed, now: float) -> bool:
         """Handle an answer other than the response; return whether it is one."""

@@ -9,10 +9,12 @@ A frame need not state its direction. It is determined by these rules:
 
 from __future__ import annotations
 
+import contextlib
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from qlinkgen.link.asked import answer_to
 from qlinkgen.link.codec import (
     Codec,
     Command,
@@ -102,6 +104,7 @@ class Monitor:
         #: Faults reported by one of the two decoders, by offset; it may be that of the wrong direction.
         self._suspected: dict[int, Fault] = {}
         self._pending: _Pending | None = None
+        self._answer_to = answer_to(codec)
 
     @property
     def skipped(self) -> int:
@@ -164,6 +167,9 @@ class Monitor:
     def _message(self, request: Framed | None, response: Framed | None, now: float) -> None:
         # Both events are of the same frame, decoded or refused in each direction.
         pending = self._pending
+        if response is not None and pending is not None and self._answer_to is not None:
+            with contextlib.suppress(self._codec.DecodeError):  # then it answers something else
+                response = self._answer_to(pending.request, response)
         if response is not None and pending is not None and self._fits(pending, response):
             in_time = not pending.answered and now < pending.deadline
             if in_time or request is None:

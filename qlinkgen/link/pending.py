@@ -58,7 +58,7 @@ class Pending:
     def replied_by(self, message: Framed, node: int | None) -> OtherReply | None:
         """Return the reply other than the response that a message from a node is; None if it is not one."""
         reply = self.command.replies.get(type(message))
-        if reply is None or not self._from_asked(node):
+        if reply is None or not self.from_asked(node):
             return None
         if self.command.accepts is not None and type(message) is self.command.response:
             return reply if self.command.accepts(self.request, message) else None
@@ -68,11 +68,12 @@ class Pending:
         same = all(getattr(message, name) == getattr(self.request, name) for name in reply.echoes)
         return reply if same else None
 
-    def _from_asked(self, node: int | None) -> bool:
+    def from_asked(self, node: int | None) -> bool:
+        """Whether a node was asked."""
         return node == self.node or (self.to_all and self.command.answers_broadcast)
 
     def may_be_answered_by(self, message: Framed, node: int | None) -> bool:
         """Whether a message from a node has the class and address of an answer, to any attempt."""
         command = self.command
         known = type(message) is command.response or type(message) in command.replies
-        return known and self._from_asked(node)
+        return known and self.from_asked(node)

@@ -13,6 +13,8 @@ __all__ = ["Direction", "Field", "Message", "Value"]
 
 #: "request": master to slave; "response": slave to master; "message": from any node, without a response.
 Direction = Literal["request", "response", "message"]
+#: Name of the message that carries the answers which only their request tells apart.
+CARRIER = "unasked"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +56,8 @@ class Message:
     echoed: tuple[str, ...] = ()
     #: Bytes of attributes that check values cover, by their names in ``over``.
     seeds: tuple[tuple[str, bytes], ...] = ()
+    #: It carries the answers with its number, which only their request tells apart.
+    carries: bool = False
 
     @cached_property
     def min_size(self) -> int:

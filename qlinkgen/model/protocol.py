@@ -65,7 +65,20 @@ class Protocol:
 
     def received(self, direction: Direction) -> tuple[Message, ...]:
         """Messages that a decoder for a direction accepts, those that both sides send included."""
-        return tuple(m for m in self.messages if m.direction in (direction, "message"))
+        return tuple(
+            m for m in self.messages if m.direction in (direction, "message") and not self.is_asked(m)
+        )
+
+    @cached_property
+    def carrier(self) -> Message | None:
+        """The message that carries answers which only their request tells apart, None without any."""
+        return next((each for each in self.messages if each.carries), None)
+
+    def is_asked(self, message: Message) -> bool:
+        """Whether only its request tells a message from others."""
+        carrier = self.carrier
+        same = carrier is not None and message.direction == "response" and message.id == carrier.id
+        return same and message is not carrier
 
     @property
     def directions(self) -> tuple[Direction, ...]:

@@ -40,7 +40,10 @@ def plan_of(protocol: Protocol, options: Options | None = None) -> Plan:
         protocol=protocol,
         role=options.role,
         frames=frames,
-        messages=tuple(_message(frames[message.direction], message, options) for message in messages),
+        messages=tuple(
+            _message(frames[message.direction], message, options, asked=protocol.is_asked(message))
+            for message in messages
+        ),
         commands=tuple(command for command in protocol.commands if command.request.name in names),
         enums=tuple(each for each in protocol.enums if not options.only or each.name in used),
         flags=tuple(each for each in protocol.flags if not options.only or each.name in used),
@@ -48,7 +51,7 @@ def plan_of(protocol: Protocol, options: Options | None = None) -> Plan:
     )
 
 
-def _message(frame: FramePlan, message: Message, options: Options) -> MessagePlan:
+def _message(frame: FramePlan, message: Message, options: Options, *, asked: bool) -> MessagePlan:
     payload = payload_plan(message, frame.envelope.payload.trim)
     envelope = frame.with_check(checked=message.checksum)
     size = envelope.overhead + payload.most
@@ -62,6 +65,7 @@ def _message(frame: FramePlan, message: Message, options: Options) -> MessagePla
         wire_size=size + _growth(frame, envelope, message),
         encoded=select.encoded(message, options.role),
         decoded=select.decoded(message, options.role),
+        asked=asked,
     )
 
 

@@ -25,12 +25,15 @@ wrong length ``length``.
 A marked frame has no length: a payload size that its message cannot have is ``frame``, as are a wrong header
 or end, and bytes after the end. In a frame without leading constants an unknown number or an illegal address
 is found in step 2.
+
+An answer that only its request tells from others is checked as the message that carries all of them. Then it
+is the first answer to the request whose payload is valid; if none is, the fault is that of the first.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import assert_never
 
 from qlinkgen.model.message import Direction
@@ -183,7 +186,7 @@ class Codec:
     # From the wire
 
     def decode(self, wire: bytes, direction: Direction, request: bytes = b"") -> Decoded:
-        """The message of exactly one frame; ``request`` is the packet that it answers. Raises BadFrame."""
+        """The message of exactly one frame; ``request`` is the frame that it answers. Raises BadFrame."""
         if not wire:
             raise BadFrame("truncated", 0)
         try:
@@ -205,7 +208,7 @@ class Codec:
                 taken = frame_reader(frame, known).read(wire, hunting=hunting)
                 if wire[taken.end :] not in (b"", taken.due):
                     raise BadFrame("length", taken.end)
-                return self.judge(taken, direction)
+                return self.judge(taken, direction, request)
             case _:
                 assert_never(frame.receiver)
 
@@ -228,7 +231,23 @@ class Codec:
             raise BadFrame(bad.kind, taken.end, bad.field) from None
         if message.allowed and taken.address is not None and not message.allowed.holds(taken.address):
             raise BadFrame("range", taken.end, self.plan.frame.address)
-        return Decoded(message, taken.address, values, taken.payload, _beside(envelope, taken))
+        decoded = Decoded(message, taken.address, values, taken.payload, _beside(envelope, taken))
+        if request and message is self.plan.carrier:
+            return self._answer(decoded, request, taken.end)
+        return decoded
+
+    def _answer(self, carried: Decoded, request: bytes, end: int) -> Decoded:
+        """The answer to a request in what carries it. Raises BadFrame, as for the first answer."""
+        faults = []
+        for message in self.plan.asked.get(self.decode(request, "request").message.name, ()):
+            try:
+                values = content.unpack(message.payload, carried.payload)
+                return replace(carried, message=message, values=values)
+            except BadContent as bad:
+                faults.append(BadFrame(bad.kind, end, bad.field))
+        if faults:
+            raise faults[0]
+        return carried
 
     def _verify(
         self,

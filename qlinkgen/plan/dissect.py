@@ -43,7 +43,7 @@ Named = Part | Step | Member | None
 
 
 def dissect(plan: Plan, wire: bytes, direction: Direction, request: bytes = b"") -> Dissection:
-    """Dissect exactly one frame; ``request`` is the packet that it answers."""
+    """Dissect exactly one frame; ``request`` is the frame that it answers."""
     codec = Codec(plan)
     try:
         codec.decode(wire, direction, request)
@@ -300,7 +300,17 @@ class _Walk:
             cells = {name: cell.data for name, cell in self.cells.items()}
             self.number = gathered(self.envelope.id, cells)
             self.address = gathered(self.envelope.address, cells) if self.envelope.address else None
-        self.message = None if self.number is None else self.known.get(self.number)
+        self.message = None if self.number is None else self._told(self.known.get(self.number))
+
+    def _told(self, message: MessagePlan | None) -> MessagePlan | None:
+        """The answer to the request in a message that carries several: the valid one, or the first."""
+        if message is None or not self.request or message is not self.plan.carrier:
+            return message
+        try:
+            return self.codec.decode(self.wire, self.direction, self.request).message
+        except BadFrame:
+            asked = self.codec.decode(self.request, "request").message
+            return self.plan.asked.get(asked.name, (message,))[0]
 
     def _number_in(self, part: Part, integer: Integer) -> int | None:
         data = self._found(part).data

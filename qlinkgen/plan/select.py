@@ -36,6 +36,8 @@ def kept(protocol: Protocol, options: Options) -> tuple[Message, ...]:
     wanted = set(options.only)
     commands = [command for command in protocol.commands if command.name in wanted]
     wanted |= {message.name for command in commands for message in command.messages}
+    if any(protocol.is_asked(m) and m.name in wanted for m in protocol.messages):
+        wanted |= {message.name for message in protocol.messages if message.carries}
     return tuple(m for m in protocol.messages if not wanted or {m.name, m.command} & wanted)
 
 

@@ -32,6 +32,7 @@ class MessagePlan:
         wire_size: maximum size on the wire.
         encoded: whether the role of the plan sends it.
         decoded: whether the role of the plan receives it.
+        asked: whether only its request tells it from other answers, which the carrier carries.
     """
 
     message: Message
@@ -42,6 +43,7 @@ class MessagePlan:
     wire_size: int
     encoded: bool
     decoded: bool
+    asked: bool
 
     @property
     def name(self) -> str:
@@ -130,7 +132,30 @@ class Plan:
 
     def received(self, direction: Direction) -> tuple[MessagePlan, ...]:
         """Messages that a decoder for a direction accepts, those that both sides send included."""
-        return tuple(m for m in self.messages if m.direction in (direction, "message"))
+        return tuple(m for m in self.messages if m.direction in (direction, "message") and not m.asked)
+
+    @cached_property
+    def asked(self) -> Mapping[str, tuple[MessagePlan, ...]]:
+        """Answers that only their request tells apart, by its name: the response first, then other replies.
+
+        The first one whose payload is valid is the answer.
+        """
+        found = {}
+        for command in self.commands:
+            answers = [self.by_name.get(each.name) for each in command.messages[1:]]
+            asked = tuple(each for each in answers if each is not None and each.asked)
+            if asked:
+                found[command.request.name] = asked
+        return found
+
+    def is_first(self, message: MessagePlan) -> bool:
+        """Whether a message is the answer to its request whenever its payload is valid."""
+        return any(answers[0].name == message.name for answers in self.asked.values())
+
+    @cached_property
+    def carrier(self) -> MessagePlan | None:
+        """The message that carries them, None if there are none."""
+        return next((each for each in self.messages if each.message.carries), None)
 
     def known(self, direction: Direction) -> Mapping[int, MessagePlan]:
         """Messages that a decoder for a direction accepts, by number."""

@@ -61,6 +61,8 @@ class CommandBuilder:
         self._sizes: dict[str, tuple[tuple[str, str], ...]] = {}
         self._singles: dict[str, Message] = {}
         self._steps = StepBuilder(file, report, messages, self._singles, self._sizes)
+        #: Names of the answers that only their request tells apart, and of the message that carries them.
+        self._asked: frozenset[str] = frozenset()
         self.messages: list[Message] = []
         self.commands: list[Command] = []
 
@@ -75,12 +77,23 @@ class CommandBuilder:
             self._command(name, spec, ("commands", name))
         self._replies.check_meant()
         self.messages += self._singles.values()
+        self._carry()
         if not self._file.commands and not self._file.messages:
             what = "the protocol has no commands and no messages"
             needs = (("commands",), ("messages",))
             self._report.error("empty-protocol", (), what, "add commands: or messages:", needs=needs)
         self._check_ids()
         self._check_only()
+
+    def _carry(self) -> None:
+        """Add the message that carries the answers which only their request tells apart."""
+        steps = {name for name, spec in self._file.commands.items() if spec.steps is not None}
+        others = steps | self._singles.keys()
+        answers = [m for m in self.messages if m.direction == "response" and m.command not in others]
+        asked = self._build.asked.of(answers, self._build.id_places)
+        if asked:
+            self.messages.append(self._build.carrier(asked))
+            self._asked = frozenset(each.name for each in (*asked, self.messages[-1]))
 
     def _command(self, name: str, spec: CommandSpec, path: Path) -> None:
         defaults = self._file.defaults
@@ -312,16 +325,24 @@ class CommandBuilder:
 
     def _check_ids(self) -> None:
         seen: dict[tuple[str, int], Message] = {}
+        answers = {each.response.name for each in self.commands if each.response is not None} - {
+            *self._singles
+        }
         for message in self.messages:
             path = self._build.id_places[message.name]
             self._check_id_fits(message, path)
             directions = ("request", "response") if message.direction == "message" else (message.direction,)
             for direction in directions:
                 other = seen.setdefault((direction, message.id), message)
-                if other is not message:
+                if other is not message and not {message.name, other.name} <= self._asked:
                     what = f"{self._called(message)} has the id of {self._called(other)}, {message.id:#04x}"
                     needs = (path, self._build.id_places[other.name])
-                    self._report.error("overlapping-id", path, what, "use another id", needs=needs)
+                    hint = "use another id"
+                    if message.name in answers and other.name in answers:
+                        hint += (
+                            "; a number of all answers is stated once, in defaults: {response: {id: 0x55}}"
+                        )
+                    self._report.error("overlapping-id", path, what, hint, needs=needs)
 
     def _called(self, message: Message) -> str:
         """The name of what states the number of a message: a command, or a message with one of its own."""

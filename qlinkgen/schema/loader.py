@@ -11,6 +11,7 @@ from qlinkgen._resources import library_dir, schemas_dir
 from qlinkgen.errors import Fault, SchemaError
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.schema.addresses import check_addresses
+from qlinkgen.schema.asked import check_told
 from qlinkgen.schema.commands import CommandBuilder, build_bus
 from qlinkgen.schema.echoes import check_echoes
 from qlinkgen.schema.examples import build_examples
@@ -181,6 +182,7 @@ def _build(
         includes=file.include or "",
         version=str(version) if version else "",
     )
+    check_told(protocol, messages.id_places, report)
     # With another checksum, or in another version, the bytes of the document are wrong.
     examples = build_examples(file, protocol, report) if crc is None and version is None else ()
     return replace(protocol, examples=examples)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Literal, NamedTuple, assert_never
 
 from qlinkgen.model.fields import Field, Record, Records
@@ -10,6 +10,7 @@ from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.transaction import Addressing, Bus
 from qlinkgen.model.types import Array, Bits, Blob, Chunk, Scalar
+from qlinkgen.schema.asked import AskedBuilder
 from qlinkgen.schema.fields import FieldBuilder, is_open
 from qlinkgen.schema.file_base import Fact
 from qlinkgen.schema.file_commands import CommandSpec, MessageSpec
@@ -61,6 +62,7 @@ class MessageBuilder:
         self.places: dict[str, Path] = {}
         self.id_places: dict[str, Path] = {}
         self._ids = IdBuilder(report, frame)
+        self.asked = AskedBuilder(file, report, fields, frame)
 
     @property
     def addressed(self) -> bool:
@@ -167,6 +169,14 @@ class MessageBuilder:
             what = f"{name} is not the response to a request"
             hint = "add direction: request, or make it a command"
             self._report.error("bad-packet", ("messages", name), what, hint, of_key=True, absent=True)
+        return message
+
+    def carrier(self, answers: Sequence[Message]) -> Message:
+        """The message that carries answers which only their request tells apart."""
+        self.asked.check_name()
+        path = self.id_places[answers[0].name]
+        message = self.asked.carrier(answers, path)
+        self.places[message.name] = self.id_places[message.name] = path
         return message
 
     def _addresses(

@@ -193,6 +193,10 @@ class StatedId:
     added: int = 0
 
 
+#: The id of a message in a frame without one.
+NO_ID = "none"
+
+
 @dataclass(frozen=True, slots=True)
 class AnswerId:
     """The number of an answer, or what is added to that of the request."""

@@ -11,7 +11,7 @@ from qlinkgen.model.message import Direction
 from qlinkgen.model.types import Bits, Float, Scalar, byte_chunks
 from qlinkgen.schema.file_fields import FieldSpec
 from qlinkgen.schema.file_frames import PartBitSpec, PartSpec
-from qlinkgen.schema.notation import StatedId, shown
+from qlinkgen.schema.notation import NO_ID, StatedId, shown
 from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.types import TypeBuilder
@@ -220,7 +220,7 @@ class IdBuilder:
             return (given if isinstance(given, int) else 0 if given else self._missing(path)) + stated.added
         names = [each.name for each in self._pieces]
         if not names:
-            if given is not None or stated.added:
+            if given not in (None, NO_ID) or stated.added:
                 hint = "remove it, or add a part with role: message"
                 self._wrong(path, "the frame has no message id", hint)
             return 0

@@ -74,7 +74,7 @@ def _bytes_of(part: Part, frame: DelimitedFrame, messages: Sequence[Message]) ->
         case "constant" | "terminator":
             return frozenset(part.constant)
         case "payload":
-            return _joined(_bytes_in(field) for message in messages for field in message.fields)
+            return _joined(bytes_in(field) for message in messages for field in message.fields)
         case "checksum":
             assert part.checksum is not None
             return _joined(frozenset(range(chunk.mask + 1)) for chunk in part.checksum.chunks)
@@ -138,7 +138,7 @@ def values_of(chunk: Chunk, low: int, high: int) -> Alphabet:
     return frozenset(value & chunk.mask for value in range(first, last + 1))
 
 
-def _bytes_in(field: Field) -> Alphabet:
+def bytes_in(field: Field) -> Alphabet:
     """The bytes that can occur in a field of a valid message."""
     kind = field.type
     match kind:
@@ -151,7 +151,7 @@ def _bytes_in(field: Field) -> Alphabet:
         case Scalar():
             return _bytes_of_number(kind)
         case Record() | Records():
-            return _joined(map(_bytes_in, kind.layout.fields))
+            return _joined(map(bytes_in, kind.layout.fields))
         case _:
             assert_never(kind)
 

@@ -161,6 +161,8 @@ class _Source:
                 f"        status = {function}_decode({call}frame.payload, frame.size);",
                 "    }",
             )
+        else:  # the check does not know an answer that only its request tells
+            self._add("    if (status == @P@_OK && frame.size != 0U) { status = @P@_ERROR_LENGTH; }")
         self._add("    if (status != @P@_OK) { fail(status); return; }")
         address = self.header.address
         self._add(

@@ -11,7 +11,7 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.naming import handler, member, snake
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Allowance, Bus, Command, Exchange, Repeat
-from qlinkgen.plan.tree import MessagePlan
+from qlinkgen.plan.tree import MessagePlan, Plan
 
 
 def callback_name(names: Names, message: Message) -> str:
@@ -82,10 +82,28 @@ class SlaveGroup:
 
 @dataclass(frozen=True, slots=True)
 class Callback:
-    """A message for a master or a listener."""
+    """A message for a master or a listener; ``asked`` if only its request tells it from others."""
 
     name: str
     expected: Expected
+    asked: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A request whose answers only it tells from others: their members in the order of trial."""
+
+    constant: str
+    answers: list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Carrier:
+    """The message that carries these answers: its member, its macros, and the check of received frames."""
+
+    name: str
+    constant: str
+    check: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -264,10 +282,30 @@ def slave_groups(entries: list[SlaveEntry], prefix: str) -> list[SlaveGroup]:
 def callbacks(names: Names, address: Address, kept: Sequence[MessagePlan]) -> list[Callback]:
     """Messages for a master or a listener, in schema order."""
     return [
-        Callback(callback_name(names, message.message), expected(names, address, message))
+        Callback(callback_name(names, message.message), expected(names, address, message), message.asked)
         for message in kept
         if message.direction != "request"
     ]
+
+
+def asked(names: Names, plan: Plan) -> list[Asked]:
+    """The requests whose answers only they tell apart."""
+    return [
+        Asked(
+            names.constant(plan.message(request).message),
+            [callback_name(names, each.message) for each in answers],
+        )
+        for request, answers in plan.asked.items()
+    ]
+
+
+def carrier(names: Names, plan: Plan) -> Carrier | None:
+    """The message that carries these answers, None if there are none."""
+    found = plan.carrier
+    if found is None:
+        return None
+    message = found.message
+    return Carrier(callback_name(names, message), names.constant(message), f"{names.prefix}_response_check")
 
 
 def transactions(protocol: Protocol, upper: str, commands: tuple[Command, ...]) -> list[Transaction]:

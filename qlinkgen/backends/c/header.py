@@ -235,6 +235,8 @@ class Header:
             replies=self._replies(slave),
             slave_groups=dispatch.slave_groups(slave, self._names.prefix),
             master=dispatch.callbacks(self._names, self._address, self._plan.messages) if listens else [],
+            asked=dispatch.asked(self._names, self._plan),
+            carrier=dispatch.carrier(self._names, self._plan),
             transactions=dispatch.transactions(self._protocol, self._names.upper, commands),
             turns=dispatch.turns(self._names, self._protocol.exchanges.values(), self._kept),
             dialogues=dispatch.dialogues(self._names, commands) if listens else [],

@@ -146,7 +146,9 @@ class Entries:
     def _has_callback(self, message: MessagePlan) -> bool:
         """Whether a listener has a function for it."""
         listens = self._plan.received_directions != ("request",)
-        return bool(self._header.listener) and listens and message.direction != "request"
+        return (
+            bool(self._header.listener) and listens and message.direction != "request" and not message.asked
+        )
 
     def _answer(self, message: MessagePlan) -> Answer | None:
         header, exchange = self._header, self._plan.protocol.exchanges.get(message.name)

@@ -62,7 +62,7 @@ def stream(plan: Plan, message: MessagePlan, rows: Sequence[Row]) -> Stream | No
     If only an id distinguishes frames from noise, noise can become part of a frame. Returns None for a
     message that is not received, or if not even consecutive frames are received as sent.
     """
-    if not message.decoded or (plan.frame.needs_request and message.direction == "response"):
+    if not message.decoded or message.asked or (plan.frame.needs_request and message.direction == "response"):
         return None
     for noisy, everything in ((True, True), (False, True), (False, False)):
         found = _heard(plan, plan.direction_of(message), rows, noisy=noisy, everything=everything)

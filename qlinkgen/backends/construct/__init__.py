@@ -36,12 +36,13 @@ _SUPPORT = {
     "_frames": "CRC Address AddressBits Blocks Cell Check Constant ConstantBits DelimitedFrame Equal "
     "Fletcher Id IdBits Length Mark MarkedFrame Packet Payload Stuffing Sum Xor messages_of",
     "_ended": "Add Cobs Digits EndedFrame Escape Pair",
+    "_fasked": "Asked Told",
     "_frecords": "Record",
     "_ftrimmed": "Trimmed",
     "_fwalks": "Walked",
 }
 #: Copied only if a tree uses them.
-_OPTIONAL = ("_ended", "_frecords", "_ftrimmed", "_fwalks", "_packed")
+_OPTIONAL = ("_ended", "_fasked", "_frecords", "_ftrimmed", "_fwalks", "_packed")
 _ORIGINS = {"Decimal": "decimal"} | {
     name: f".{file}" for file, names in _SUPPORT.items() for name in names.split()
 }
@@ -74,7 +75,7 @@ def _imports(everything: tuple[Definition, ...]) -> str:
     blocks = (
         ["decimal"],
         ["construct"],
-        ["._ended", "._fields", "._frames", "._frecords", "._ftrimmed", "._fwalks", "._packed"],
+        ["._ended", "._fasked", "._fields", "._frames", "._frecords", "._ftrimmed", "._fwalks", "._packed"],
     )
     lines = (
         "".join(_import(origin, by_origin[origin]) for origin in block if origin in by_origin)

@@ -111,8 +111,17 @@ def _frames(plan: Plan, messages: Mapping[str, str], types: Types) -> Iterator[D
         layout = _layout(plan.frames[direction].envelope, types) if frame.needs_request else Ref("LAYOUT")
         chosen = Sequence(tuple(Ref(messages[each.name]) for each in plan.received(direction)))
         frames.append(Ref(name))
-        yield Definition(name, _frame(frame, layout, chosen))
+        made = _frame(frame, layout, chosen)
+        if direction == "response" and plan.carrier is not None:
+            made = Call("Told", (made, *frames[:-1], *_asked(plan, messages)))
+        yield Definition(name, made)
     yield Definition("MESSAGES", Call("messages_of", tuple(frames)), "Payloads by full name.")
+
+
+def _asked(plan: Plan, messages: Mapping[str, str]) -> Iterator[Node]:
+    """Each request whose answers only it tells apart, and these."""
+    for request, answers in plan.asked.items():
+        yield Call("Asked", (request, *(Ref(messages[each.name]) for each in answers)))
 
 
 def _algorithms(envelope: Envelope) -> Mapping[catalogue.Checksum, str]:

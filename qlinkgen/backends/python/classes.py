@@ -298,7 +298,15 @@ def _message_of(layout: Layout) -> MessagePlan:
     )  # fmt: skip
     payload = record_plan(layout).payload
     return MessagePlan(
-        stated, payload, Envelope(()), None, payload.most, payload.most, encoded=True, decoded=True
+        stated,
+        payload,
+        Envelope(()),
+        None,
+        payload.most,
+        payload.most,
+        encoded=True,
+        decoded=True,
+        asked=False,
     )
 
 

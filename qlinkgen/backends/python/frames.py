@@ -38,13 +38,17 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 
 @dataclass(frozen=True)
 class DecodedDirection:
-    """A decoded direction: its function, its word in texts, and the names of its tables."""
+    """A decoded direction: its function, its word in texts, and the names of its tables.
+
+    ``asking`` is the parameter of the function for the request, "" if no answer needs it.
+    """
 
     direction: Direction
     function: str
     words: str
     classes: str
     readers: str
+    asking: str
     by_id: str
     readers_by_id: str
 
@@ -360,6 +364,7 @@ def _decoded_direction(plan: Plan, direction: Direction) -> DecodedDirection:
         words="" if whole else f"{direction} ",
         classes="_MESSAGES" if whole else f"{upper}S",
         readers=f"{upper}_READERS",
+        asking=", request: Message | None = None" if direction == "response" and plan.asked else "",
         by_id=_by_id(messages),
         readers_by_id=_by_id(messages, ".from_checked"),
     )

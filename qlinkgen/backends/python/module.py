@@ -83,6 +83,8 @@ class ModuleView:
     decoded_directions: Sequence[frames.DecodedDirection]
     direction_type: str
     direction_default: str
+    asked: Sequence[str]
+    carrier: str
     stream_decoder: Sequence[str]
     doc: Sequence[str]
     enums: Sequence[tables.ConstantsModel]
@@ -118,6 +120,8 @@ class Module:
             decoded_directions=decoded_directions,
             direction_type=f"Literal[{', '.join(quoted)}]",
             direction_default=f" = {quoted[0]}" if len(quoted) == 1 else "",
+            asked=_asked(plan),
+            carrier=class_name(plan.carrier) if plan.carrier else "",
             stream_decoder=_stream_decoder(quoted),
             doc=self._doc(),
             enums=[tables.enum_model(each, self.place.classes[each.name]) for each in plan.enums],
@@ -226,6 +230,7 @@ class Module:
         names += ["OtherReply"] if any(each.meant for each in self.plan.commands) else []
         names += ["BUS", "COMMANDS", "MESSAGES", "Message", "StreamDecoder", *_PUBLIC]
         names += [each.function for each in decoded_directions]
+        names += ["answer_to"] if _asked(self.plan) else []
         match view:
             case PacketView():
                 names += ["Request", "Response", "decode_request", "decode_response"]
@@ -236,6 +241,14 @@ class Module:
         if not isinstance(view, PacketView):
             names += ["encode", *(["Codec"] if view.check and view.check.selectable else [])]
         return sorted(set(names), key=by_kind)
+
+
+def _asked(plan: Plan) -> list[str]:
+    """The rows of the table of answers that only their request tells apart; none without a decoder."""
+    if "response" not in plan.received_directions:
+        return []
+    named = {request: ", ".join(map(class_name, answers)) for request, answers in plan.asked.items()}
+    return [f"{class_name(plan.message(request))}: ({answers},)" for request, answers in named.items()]
 
 
 def _stream_decoder(directions: Sequence[str]) -> list[str]:

@@ -76,6 +76,8 @@ class _Vectors:
         beside = _beside(message, kind, chance)
         request = self._request(message, kind)
         wire = self._codec.encode(message.name, {**values, **beside}, address, request)
+        if message.asked:
+            request = self._asking(message, kind, wire)
         return Good(message, address, values, beside, pack(message.payload, values), wire, request)
 
     def _request(self, message: MessagePlan, kind: str) -> bytes:
@@ -84,12 +86,24 @@ class _Vectors:
             return b""
         return self._one(self._codec.plan.message(f"{message.message.command}.request"), kind).wire
 
+    def _asking(self, message: MessagePlan, kind: str, wire: bytes) -> bytes:
+        """A request by which the frame of an answer is told from others, b"" if there is none."""
+        plan, told = self._codec.plan, self._codec.decode
+        asked = [
+            name for name, answers in plan.asked.items() if message.name in (each.name for each in answers)
+        ]
+        requests = (self._one(plan.message(name), kind).wire for name in asked)
+        found = (each for each in requests if told(wire, "response", each).message.name == message.name)
+        return next(found, b"")
+
     def faults(self, messages: Iterable[Mapping[str, Good]]) -> Iterator[Mapping[str, Json]]:
         """The wrong frames; those that are the same for all messages only for the first of each direction."""
         faults = Faults(self._codec)
         begun: set[Direction] = set()
         for good in messages:
             one = good["defaults"]
+            if one.message.asked and not self._codec.plan.is_first(one.message):
+                continue  # wrong ones may be other answers
             yield from (bad.entry() for bad in faults.of(one, first=one.message.direction not in begun))
             begun.add(one.message.direction)
 
@@ -97,6 +111,8 @@ class _Vectors:
         """The lines of a message in the file, one for each distinct frame."""
         kinds: dict[tuple[bytes, bytes], list[str]] = {}
         for kind, good in vectors.items():
+            if good.message.asked and not good.request:
+                continue  # it is another answer
             kinds.setdefault((good.request, good.wire), []).append(kind)
         for same in kinds.values():
             yield self._row(same, vectors[same[0]])

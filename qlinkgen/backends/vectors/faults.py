@@ -68,7 +68,7 @@ class Good:
     beside: Mapping[str, Raw]
     payload: bytes
     wire: bytes
-    #: The packet that it answers, b"" if it does not depend on one.
+    #: The frame that it answers, b"" if it does not depend on one.
     request: bytes
 
 

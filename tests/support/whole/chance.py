@@ -22,7 +22,11 @@ def mark(reference: Reference) -> int:
 
 
 def request(reference: Reference, message: Message, rng: random.Random) -> bytes:
-    """The packet of a request, if the response depends on it."""
+    """The frame of a request, if the response depends on it."""
+    if told := reference.asking(message):
+        asked = reference.by_name[rng.choice([*told])]
+        given = values(asked, rng, mark(reference))
+        return reference.encode(asked.name, given, address(asked, rng))[1]
     if not isinstance(reference.frame, Packets) or message.direction != "response":
         return b""
     asked = reference.by_name[message.name.replace(".response", ".request")]

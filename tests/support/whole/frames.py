@@ -58,6 +58,11 @@ class Shape:
     #: A part states the direction, so every message needs one.
     directed: bool = False
 
+    @property
+    def shares(self) -> bool:
+        """Whether only their request may tell answers apart: of any size, with the same attributes."""
+        return self.kind == "parts" and self.has_length and not self.trimmed and not self.seeds
+
     def fit(self, number: int) -> int:
         """A number that can be an id."""
         if not self.text_id:

@@ -225,6 +225,7 @@ class _Maker:
                 if means := self._means(spec["response"]["fields"]):
                     spec["response"]["means"] = means
         taken = {*found["commands"], *found["messages"], "request", "response"}
+        self._told_by_request(shape, maker, found, (used, taken))
         if answered and rng.random() < 0.7:
             relative = rng.random() < 0.6
             asked = [shape.number(each["id"]) for each in answered.values()]
@@ -295,6 +296,24 @@ class _Maker:
             steps.append({"receive": "response"})
         elif any("receive" in step for step in steps):
             del command["response"]
+
+    def _told_by_request(
+        self, shape: Shape, maker: FieldMaker, found: Doc, seen: tuple[set[tuple[str, int]], set[str]]
+    ) -> None:
+        """Give all answers one number, often, and perhaps that of another reply too."""
+        used, taken = seen
+        answered = [each for each in found["commands"].values() if each["response"] != "none"]
+        if len(answered) < 2 or not shape.shares or self.rng.random() < 0.2:
+            return
+        number = self._answer_id(shape, [], used, relative=False)
+        if number is None:
+            return
+        found["defaults"] = {"response": {"id": number}}
+        if self.rng.random() < 0.4:
+            reply = self._reply(shape, maker, number)
+            # A byte at its end tells it from answers without one, by its size or by its number.
+            reply["fields"]["told"] = {"type": "u8", "const": self.rng.choice((0, 1, 0xA5))}
+            self.rng.choice(answered)["replies"] = {self.words.name(taken): reply}
 
     def _more_of(self, shape: Shape, command: Doc) -> None:
         """Several answers, or one of a size that the request says."""

@@ -29,6 +29,7 @@ from tests.support.cdriver import Driver
 from tests.support.whole.reference import Event, Raw, Reference, Seen, Wrong
 from tests.support.whole.reference.document import Message, Number, Record, Records, Run, Value
 from tests.support.whole.reference.frames import Frame
+from tests.support.whole.reference.special import Packets
 from tests.support.whole.reference.values import decode as decode_payload
 from tests.support.whole.reference.values import default
 
@@ -387,7 +388,7 @@ class CTarget(Target):
 
     def decode(self, message: Message, wire: bytes, request: bytes) -> Seen:
         """See Target."""
-        context = (request.hex(),) if request else ()
+        context = (request.hex(),) if request and isinstance(self.reference.frame, Packets) else ()
         address, *found = self._ask("decode", message.name, wire.hex() or "-", *context)
         words = iter(found)
         values: dict[str, Raw] = {name: told(kind, _raw(kind, words)) for name, kind in message.beside}

@@ -283,10 +283,11 @@ class _Trial:
         given = chance.values(message, self.rng, self.mark)
         place, request = chance.address(message, self.rng), chance.request(self.reference, message, self.rng)
         payload, wire = self.reference.encode(message.name, given, place, request)
+        covered = request if isinstance(self.reference.frame, Packets) else b""
         wrong = chance.wrong_frames(self.reference, message, payload, wire, self.rng, request=request)
         for target in list(self.targets):
             about = f"{message.name} {given} at {place}"
-            encode = partial(target.encode, message, given, place, request)
+            encode = partial(target.encode, message, given, place, covered)
             self._same("encode", target, about, lambda: (payload, wire), encode)
         for frame in (wire, *wrong):
             self._decoded(message, frame, request)
@@ -299,6 +300,9 @@ class _Trial:
         except Wrong as wrong:
             expected = wrong
         asked = self.reference.by_name[expected.name] if isinstance(expected, Seen) else message
+        if isinstance(expected, Wrong) and (told := self.reference.asking(message)):
+            # A fault is that of the first answer to the request.
+            asked = told[self.reference.decode("request", request).name][0]
 
         def right() -> Seen:
             if isinstance(expected, Wrong):

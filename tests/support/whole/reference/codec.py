@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tests.support.whole.reference import document, values
+from tests.support.whole.reference.asked import CARRIER, asked
 from tests.support.whole.reference.document import Direction, Fields, Message, part_doc, whole_span
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.receivers import (
@@ -60,6 +61,9 @@ class Reference:
         if trim is not None:
             keep = 0 if trim == "zeros" else trim.get("keep", 0)
             self.messages = tuple(replace(each, trim=keep) for each in self.messages)
+        self.asked = asked(data, Fields(data, most), self.messages)
+        if self.asked is not None:
+            self.messages = (*self.messages, replace(self.asked.carrier, beside=self.messages[0].beside))
         self.by_name = {message.name: message for message in self.messages}
         used = {message.direction for message in self.messages}
         self.directions: tuple[Direction, ...] = (
@@ -68,7 +72,14 @@ class Reference:
 
     def known(self, direction: Direction) -> dict[int, Message]:
         """The messages of a direction."""
-        return {each.number: each for each in self.messages if each.direction in (direction, "message")}
+        hidden = self.asked.names if self.asked is not None else ()
+        sent = [each for each in self.messages if each.direction in (direction, "message")]
+        return {each.number: each for each in sent if each.name not in hidden}
+
+    def asking(self, message: Message) -> Mapping[str, Sequence[Message]]:
+        """The requests that tell a message from others, and the answers to each in the order of trial."""
+        found = self.asked.answers if self.asked is not None else {}
+        return {name: each for name, each in found.items() if message.name in {one.name for one in each}}
 
     def direction_of(self, message: Message) -> Direction:
         """A direction of a message."""
@@ -122,7 +133,24 @@ class Reference:
             event = MarkedReceiver(self.frame, known).ended(wire)
         if event.kind != "message":
             raise Wrong(event.kind)
-        return Seen(event.name, event.address, event.values)
+        seen = Seen(event.name, event.address, event.values)
+        return self._told(seen, request) if request and event.name == CARRIER else seen
+
+    def _told(self, carried: Seen, request: bytes) -> Seen:
+        """The first answer to a request that has the payload. Raises Wrong, as for the first answer."""
+        assert self.asked is not None
+        beside = {name: carried.values[name] for name, _ in self.by_name[CARRIER].beside}
+        faults = []
+        for answer in self.asked.answers.get(self.decode("request", request).name, ()):
+            try:
+                found = values.decode(answer, self.asked.payload(carried.values))
+            except Wrong as wrong:
+                faults.append(wrong)
+            else:
+                return Seen(answer.name, carried.address, {**beside, **found})
+        if faults:
+            raise faults[0]
+        return carried
 
     def receiver(self, direction: Direction, asked: Sequence[bytes] = ()) -> Receiver:
         """A new receiver; `asked` are the requests that are answered."""

@@ -781,7 +781,7 @@ def _steps(name: str, spec: Doc, document: Doc, fields: Fields, addressed: bool)
         if isinstance(step[key], str):
             continue
         direction: Direction = "request" if key == "send" else "response"
-        written = _long(step[key])
+        written = long_form(step[key])
         number = _number(document, written.get("id"), spec.get("id"), direction)
         given = written["fields"]
         if index == last:
@@ -821,10 +821,11 @@ def _whole(slot: Slot, slots: Sequence[Slot]) -> Slot:
 def _answer(own: Any, common: Any) -> Any:
     """A response in its long form, or "none"."""
     given = common if own is None else own
-    return given if isinstance(given, str) else {**_long(common or {}), **_long(own or {})}
+    return given if isinstance(given, str) else {**long_form(common or {}), **long_form(own or {})}
 
 
-def _long(given: Any) -> Doc:
+def long_form(given: Any) -> Doc:
+    """A response in its long form, without any fields for a word."""
     if isinstance(given, str):
         return {}
     is_long = given.keys() <= {"id", "fields", "means"} and (

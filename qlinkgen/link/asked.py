@@ -1,0 +1,61 @@
+"""Answers that only their request tells apart: a master and a monitor know the request."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from qlinkgen.link.codec import Codec, Decoder, DecoderCounters, Fault, Framed, is_message
+
+#: The answer to a request in a received message, of `answer_to` of a generated module.
+AnswerTo = Callable[[Framed, Framed], Framed]
+
+
+class NotAnAnswer(NamedTuple):
+    """A fault: a frame that is not an answer to the request that was sent."""
+
+    kind: str
+    offset: int
+    raw: bytes
+    message: str
+
+
+def answer_to(codec: Codec) -> AnswerTo | None:
+    """The function of a codec, None if its answers are all told by their numbers."""
+    found: AnswerTo | None = getattr(codec, "answer_to", None)
+    return found
+
+
+class AskedDecoder:
+    """The receiver of a master whose answers only their request tells apart."""
+
+    def __init__(self, codec: Codec, answers: AnswerTo, asked: Callable[[Framed], Framed | None]) -> None:
+        """``asked`` returns the request that a message may answer, None without one."""
+        self._decoder: Decoder = codec.StreamDecoder("response")
+        self._answers = answers
+        self._asked = asked
+        self._error = codec.DecodeError
+        self._fed = 0
+
+    @property
+    def counters(self) -> DecoderCounters:
+        """Counts so far."""
+        return self._decoder.counters
+
+    def feed(self, data: bytes, /) -> Sequence[Framed | Fault]:
+        """Take the next bytes of the stream; return the events that they complete."""
+        self._fed += len(data)
+        return [self._told(event) for event in self._decoder.feed(data)]
+
+    def finish(self) -> Sequence[Framed | Fault]:
+        """End the stream; return the remaining events."""
+        return [self._told(event) for event in self._decoder.finish()]
+
+    def _told(self, event: Framed | Fault) -> Framed | Fault:
+        if not is_message(event) or (request := self._asked(event)) is None:
+            return event
+        try:
+            return self._answers(request, event)
+        except self._error as error:
+            raw = event.to_frame()
+            return NotAnAnswer(getattr(error, "kind", ""), self._fed - len(raw), raw, str(error))

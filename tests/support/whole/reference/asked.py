@@ -1,0 +1,77 @@
+"""Answers that only their request tells apart, and the message that carries all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tests.support.whole.reference.document import Doc, Fields, Message, long_form
+
+CARRIER = "unasked"
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """The answers to each request in the order of trial, by its name; and what carries them."""
+
+    answers: Mapping[str, Sequence[Message]]
+    carrier: Message
+
+    @property
+    def names(self) -> set[str]:
+        """The names of all answers."""
+        return {each.name for answers in self.answers.values() for each in answers}
+
+    @staticmethod
+    def payload(values: Mapping[str, Any]) -> bytes:
+        """The payload that the carrier carries."""
+        return bytes(values.get("data", b""))
+
+
+def asked(document: Doc, fields: Fields, messages: Sequence[Message]) -> Asked | None:
+    """The answers with the number that the defaults state, or in a frame without numbers."""
+    free = set(document.get("messages", {}))
+    answers = [each for each in messages if each.direction == "response" and each.name not in free]
+    parts = document["frame"].get("parts", {})
+    if not parts:
+        return None
+    numbers = {each.number for each in answers if _states(document, each)}
+    found = [each for each in answers if each.number in numbers]
+    if len(found) < 2:
+        return None
+    by_request = {
+        f"{name}.request": [each for each in found if each.name in _names(document, name)]
+        for name in document["commands"]
+    }
+    ordered = {
+        request: sorted(each, key=lambda answer: not answer.name.endswith(".response"))
+        for request, each in by_request.items()
+        if each
+    }
+    low, high = min(each.sizes[0] for each in found), max(each.sizes[1] for each in found)
+    ended = any(isinstance(spec, dict) and spec.get("role") == "terminator" for spec in parts.values())
+    kind = "text" if ended and "coding" not in document["frame"] else "bytes"
+    slots = fields.build(
+        {"data": f"{kind}[{low}..{high}]" if low < high else f"{kind}[{high}]"} if high else {}
+    )
+    first = found[0]
+    carrier = Message(CARRIER, first.number, "response", slots, first.addresses, first.default_address)
+    return Asked(ordered, carrier)
+
+
+def _states(document: Doc, answer: Message) -> bool:
+    """Whether the number of an answer is that of the defaults."""
+    common = document.get("defaults", {}).get("response")
+    if not isinstance(common, dict) or "id" not in common or str(common["id"]).startswith("request"):
+        return False
+    name, _, part = answer.name.partition(".")
+    own = document["commands"].get(name, {}).get("response")
+    return part == "response" and "id" not in long_form({} if own is None else own)
+
+
+def _names(document: Doc, command: str) -> set[str]:
+    """The names that the answers to a command may have."""
+    own = document["commands"][command].get("replies", {})
+    common = [name for name in document.get("replies", {}) if name not in own]
+    return {f"{command}.response", *common, *(f"{command}.{name}" for name in (*common, *own))}
