@@ -7,6 +7,7 @@ simulated clock.
 from __future__ import annotations
 
 from qlinkgen.link.counters import LinkCounters
+from qlinkgen.link.dialogue import Dialogue
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Event
 from qlinkgen.link.health import HealthPolicy
@@ -19,6 +20,7 @@ from qlinkgen.link.transaction import Reply
 
 __all__ = [
     "Ask",
+    "Dialogue",
     "EchoMode",
     "Event",
     "HealthPolicy",

@@ -101,6 +101,10 @@ class OtherReply(Protocol):
         ...
 
 
+#: Byte times and seconds.
+StepSpan = tuple[float, float]
+
+
 class Many(Protocol):
     """The end of several answers to one request, of a generated module."""
 
@@ -139,6 +143,11 @@ class Command(Protocol):
     @property
     def many(self) -> Many | None:
         """The end of several answers, None if there is one."""
+        ...
+
+    @property
+    def steps(self) -> Sequence[tuple[str, Any, StepSpan | None]]:  # Any: classes of messages
+        """Frames of a dialogue after its request: send or receive, class, and time limit."""
         ...
 
     @property

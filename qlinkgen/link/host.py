@@ -21,6 +21,7 @@ from collections.abc import Collection
 from qlinkgen.errors import BadReply, IllegalCommand, LinkError, NoReply
 from qlinkgen.link.attempts import Attempts
 from qlinkgen.link.codec import Framed, Message
+from qlinkgen.link.dialogue import Dialogue
 from qlinkgen.link.events import EVENTS_KEPT, Answered, Damaged, Event, Failed, Sent, TimedOut
 from qlinkgen.link.host_events import Filled, HostCounters, InStep, OutOfStep
 from qlinkgen.link.host_parts import Awaited, Unread, WayBack
@@ -120,6 +121,8 @@ class HostEngine:
         del trial
         if self._state is not HostState.IDLE:
             raise RuntimeError("another transaction is pending; a host performs one at a time")
+        if isinstance(request, Dialogue):
+            raise TypeError("a host has no dialogues")
         packet = request if type(request) is Packet else Packet(request)
         command = self._commands.get(type(packet.request))
         if command is None:

@@ -18,7 +18,7 @@ and the health of the nodes (`health`).
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from qlinkgen.errors import BadReply, Collision, LinkError, NoReply
 from qlinkgen.errors import Refused as RequestRefused
@@ -26,6 +26,7 @@ from qlinkgen.link.asked import AskedDecoder, answer_to
 from qlinkgen.link.attempts import Attempts
 from qlinkgen.link.codec import Codec, Fault, Framed, OtherReply, address_getter, cut, is_message, reason_of
 from qlinkgen.link.counters import LinkCounters
+from qlinkgen.link.dialogue import Conversation, Dialogue, Further
 from qlinkgen.link.echo import PROBE, EchoCanceller, EchoMode, EchoProbe
 from qlinkgen.link.events import (
     EVENTS_KEPT,
@@ -56,11 +57,13 @@ from qlinkgen.link.transaction import Accepts, CommandTiming, Packet, Question, 
 #: for a difference between the clocks of both sides.
 EARLY = 0.9
 
-IDLE, PROBING, WAITING = MasterState.IDLE, MasterState.PROBING, MasterState.WAITING
+IDLE, PROBING, WAITING, TURN = (
+    MasterState.IDLE, MasterState.PROBING, MasterState.WAITING, MasterState.TURN,
+)  # fmt: skip
 
 (
-    _START, _START_PROBE, _PROBED, _SENT, _UNANSWERED, _ANSWERED, _AGAIN, _MORE, _PENDING, _REPEAT, _FAIL,
-    _ABORT,
+    _START, _START_PROBE, _PROBED, _SENT, _UNANSWERED, _ANSWERED, _AGAIN, _MORE, _NEXT, _PENDING, _REPEAT,
+    _FAIL, _ABORT,
 ) = (Moves(MASTER_MOVES, event) for event in MasterEvent)  # fmt: skip
 
 
@@ -124,6 +127,8 @@ class MasterEngine:
         self._received = b""
         #: Answers to a request that has several, None to others.
         self._answers: Answers | None = None
+        #: The dialogue, None for a request and its response.
+        self._dialogue: Conversation | None = None
 
     # What a driver calls ------------------------------------------------------------------------------------
 
@@ -145,7 +150,7 @@ class MasterEngine:
         """Begin a transaction.
 
         Args:
-            request: message of the generated module.
+            request: message of the generated module, or a `Dialogue` for a command with steps.
             now: time.
             attempts: largest number of transmissions; by default that of the timing. A request that is unsafe
                 to repeat is sent once in any case.
@@ -154,22 +159,26 @@ class MasterEngine:
 
         Raises:
             EncodeError: of the generated module; a value cannot be sent.
-            TypeError: the message is not a request of this protocol.
-            ValueError: attempts is less than 1.
+            TypeError: the message is not a request of this protocol, or not that of a step.
+            ValueError: attempts is less than 1; a dialogue has other frames or goes to several nodes.
             NoReply: the node is offline, and its next trial is not due yet; nothing was sent.
             RuntimeError: another transaction is pending.
         """
         if self._state is not IDLE:
             raise RuntimeError("another transaction is pending; a bus performs one at a time")
+        further: Sequence[Further] = ()
+        if isinstance(request, Dialogue):
+            request, further = request
         if type(request) is Packet or (command := self._commands.get(type(request))) is None:
             raise TypeError(f"{type(request).__name__} is not a request of this protocol")
         tries = command.tries if attempts is None else self._tries_of(command, attempts)
         if self._numbering is not None:
             self._numbering.number(request)
         frame = self.codec.encode(request)
+        node = self._address(request)
+        dialogue = self._begun(command, request, further, node) if command.step_times or further else None
         if self._attempts.number:
             self._earlier = self._pending
-        node = self._address(request)
         count = self.counters.get(node)
         if count is None:
             count = self.counters[node] = LinkCounters()
@@ -183,6 +192,7 @@ class MasterEngine:
         self._received = b""
         self._outcome = None
         self._answers = None
+        self._dialogue = dialogue
         if self._line.suspect:
             self._line.await_quiet(now)
         if self._echo.mode == "auto":
@@ -190,6 +200,18 @@ class MasterEngine:
             self._state = _START_PROBE[IDLE]
         else:
             self._state = _START[IDLE]
+
+    def _begun(
+        self, command: CommandTiming, request: Framed, further: Sequence[Further], node: int | None
+    ) -> Conversation:
+        """Return the dialogue of a request, after a check of all messages that are known yet."""
+        dialogue = Conversation(command.definition, request, further)
+        for each in further:
+            if not callable(each):
+                self.codec.encode(each)
+                if self._address(each) != node:
+                    raise ValueError(f"{each.NAME} is for another node than {request.NAME}")
+        return dialogue
 
     def _tries_of(self, command: CommandTiming, attempts: int) -> int:
         check_attempts(attempts)
@@ -202,7 +224,7 @@ class MasterEngine:
             return b""
         if state is PROBING:
             return self._send_probe(now)
-        return self._send(now)
+        return self._send_next(now) if state is TURN else self._send(now)
 
     def receive(self, data: bytes, now: float) -> None:
         """Process received bytes."""
@@ -303,11 +325,51 @@ class MasterEngine:
             return frame
         self._earliest = now + EARLY * on_wire if self._paced else now
         self._deadline = now + on_wire + command.answer_time
+        if self._dialogue is not None:
+            self._dialogue.restart()
+            self._go_on(self._dialogue, now, on_wire)
+            return frame
         if command.many is not None:
             self._answers = Answers(command.many, pending.request)
             self._deadline += self.timing.duration(command.many)
         self._state = _SENT[self._state]
         return frame
+
+    def _send_next(self, now: float) -> bytes:
+        """Send the next frame of a dialogue."""
+        dialogue, pending = self._dialogue, self._pending
+        assert dialogue is not None
+        message = dialogue.next()
+        if self._numbering is not None:
+            self._numbering.number(message)
+        frame = self.codec.encode(message)
+        if self._address(message) != pending.node:
+            raise ValueError(f"{message.NAME} is for another node than {pending.request.NAME}")
+        self._attempts.patient_until = 0.0
+        if self._echo.mode == "expect" and self._echo.sent(frame):
+            self._echo_missing(self.counters[None], None, now)
+        self._line.suspect = False
+        if self.verbose:
+            self.events.append(Sent(now, pending.node, message, self._attempts.number, frame))
+        on_wire = len(frame) * self._byte_time
+        self._earliest = now + EARLY * on_wire if self._paced else now
+        self._go_on(dialogue, now, on_wire)
+        return frame
+
+    def _go_on(self, dialogue: Conversation, now: float, on_wire: float = 0.0) -> None:
+        """Await the next frame of a dialogue, let it be sent, or end after the last one."""
+        command = self._pending.command
+        if dialogue.receives:
+            self._deadline = now + on_wire + command.step_times[dialogue.at]
+            self._state = (_MORE if self._state is WAITING else _SENT)[self._state]
+            return
+        if on_wire and self._paced:
+            self._line.free_at = now + on_wire + command.allowance
+        if dialogue.ended:
+            self._outcome = self._attempts.reply(tuple(dialogue.answers), now)
+            self._state = _UNANSWERED[self._state]
+        else:
+            self._state = _NEXT[self._state]
 
     # Echo ---------------------------------------------------------------------------------------------------
 
@@ -360,26 +422,61 @@ class MasterEngine:
         pending, attempts = self._pending, self._attempts
         reply = pending.replied_by(message, self._address(message))
         if reply is None:
-            return self._is_one_of_many(message, now)
+            return self._is_one_of_several(message, now)
         cut(pending.command.definition, pending.request, message)
         means = reply.meaning(message)
+        if means == "done" and self._dialogue is not None and type(message) is pending.command.response:
+            return self._is_step(self._dialogue, message, now)
         event = OtherAnswer(now, pending.node, pending.request, message, means, attempts.number)
         self.events.append(event)
         if self._answers is not None and self._answers.ended_by(message):
             self._succeed(message, now)
         elif means == "done":
-            if not self._is_one_of_many(message, now):
+            if not self._is_one_of_several(message, now):
                 self._succeed(message, now)
         elif means == "pending":
             self._wait_on(reply, now)
         else:
             self._answered(message, now)
             if means == "again" and attempts.number < (self._wanted or self.timing.attempts):
-                self._state = _AGAIN[self._state]
+                self._again()
                 self._line.free_at = max(self._line.free_at, now + self.timing.pause(reply))
                 self._line.await_quiet(now)
             else:
                 self._refused(reply, message, now)
+        return True
+
+    def _again(self) -> None:
+        """Let the last frame be sent once more."""
+        if self._dialogue is not None and self._dialogue.back():
+            self._attempts.number += 1
+            self._state = _NEXT[self._state]
+        else:
+            self._state = _AGAIN[self._state]
+
+    def _is_one_of_several(self, message: Framed, now: float) -> bool:
+        """Take one of several answers; return whether it is one."""
+        if self._dialogue is not None:
+            return self._is_step(self._dialogue, message, now)
+        return self._is_one_of_many(message, now)
+
+    def _is_step(self, dialogue: Conversation, message: Framed, now: float) -> bool:
+        """Take an answer of a dialogue; return whether it is the one that is due."""
+        pending, node = self._pending, self._address(message)
+        if not dialogue.receives or type(message) is not dialogue.due:
+            return False
+        right = pending.answered_by(message, node) if dialogue.is_last_answer else node == pending.node
+        if not right:
+            return False
+        dialogue.answer(message)
+        if dialogue.ended:
+            self._succeed(message, now)
+            return True
+        self._answered(message, now)
+        event = OtherAnswer(now, pending.node, pending.request, message, "more", self._attempts.number)
+        self.events.append(event)
+        self._attempts.patient_until = 0.0
+        self._go_on(dialogue, now)
         return True
 
     def _is_one_of_many(self, message: Framed, now: float) -> bool:
@@ -457,7 +554,10 @@ class MasterEngine:
         answers = self._answers
         if pending.command.sizes:
             cut(pending.command.definition, pending.request, response)
-        self._outcome = reply = attempts.reply(response if answers is None else answers.items, now)
+        several: object = response if answers is None else answers.items
+        if self._dialogue is not None and self._dialogue.ended:
+            several = tuple(self._dialogue.answers)
+        self._outcome = reply = attempts.reply(several, now)
         self._answered(response, now)
         if self.verbose:
             event = Answered(now, pending.node, pending.request, response, reply.attempts, reply.elapsed)

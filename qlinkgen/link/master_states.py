@@ -12,6 +12,7 @@ class MasterState(StrEnum):
     PROBING = "probing"  #: two bytes are sent to detect an echo; once, if the echo is "auto"
     GUARD = "guard"  #: a request waits for a quiet line
     WAITING = "waiting"  #: waiting for the answer until the deadline
+    TURN = "turn"  #: the next frame of a dialogue is to be sent
 
 
 class MasterEvent(StrEnum):
@@ -25,6 +26,7 @@ class MasterEvent(StrEnum):
     ANSWERED = "answered"  #: the answer was received, perhaps a refusal
     AGAIN = "again"  #: a reply asks for the request once more
     MORE = "more"  #: one of several answers was received, and not the last
+    NEXT = "next"  #: a frame of a dialogue was received or sent, and the master sends the next one
     PENDING = "pending"  #: a reply announces the answer
     REPEAT = "repeat"  #: the deadline passed with attempts left
     FAIL = "fail"  #: the deadline of the last attempt passed, or the line did not become quiet in time
@@ -42,13 +44,20 @@ MASTER_MOVES = {
     (_S.PROBING, _E.ABORT): _S.IDLE,
     (_S.GUARD, _E.SENT): _S.WAITING,
     (_S.GUARD, _E.UNANSWERED): _S.IDLE,
+    (_S.GUARD, _E.NEXT): _S.TURN,
     (_S.GUARD, _E.FAIL): _S.IDLE,
     (_S.GUARD, _E.ABORT): _S.IDLE,
     (_S.WAITING, _E.ANSWERED): _S.IDLE,
     (_S.WAITING, _E.AGAIN): _S.GUARD,
     (_S.WAITING, _E.MORE): _S.WAITING,
+    (_S.WAITING, _E.NEXT): _S.TURN,
     (_S.WAITING, _E.PENDING): _S.WAITING,
     (_S.WAITING, _E.REPEAT): _S.GUARD,
     (_S.WAITING, _E.FAIL): _S.IDLE,
     (_S.WAITING, _E.ABORT): _S.IDLE,
+    (_S.TURN, _E.SENT): _S.WAITING,
+    (_S.TURN, _E.UNANSWERED): _S.IDLE,
+    (_S.TURN, _E.NEXT): _S.TURN,
+    (_S.TURN, _E.FAIL): _S.IDLE,
+    (_S.TURN, _E.ABORT): _S.IDLE,
 }

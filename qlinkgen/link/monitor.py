@@ -26,6 +26,7 @@ from qlinkgen.link.codec import (
     cut,
     is_message,
 )
+from qlinkgen.link.dialogue import Progress
 from qlinkgen.link.events import Damaged, Stray
 from qlinkgen.link.many import Answers
 from qlinkgen.link.timing import Timing
@@ -56,7 +57,7 @@ class Replied(NamedTuple):
 
 
 class Unanswered(NamedTuple):
-    """A request was not answered in time."""
+    """A request, or a later frame of a dialogue, was not answered in time."""
 
     at: float
     request: Framed
@@ -68,7 +69,10 @@ Heard = Asked | Replied | Unanswered | Stray | Damaged
 class _Pending:
     """The last request, and its deadline."""
 
-    __slots__ = ("answered", "answers", "at", "command", "deadline", "reported", "request")
+    __slots__ = (
+        "answered", "answers", "at", "command", "deadline", "dialogue", "reported", "request", "sent",
+        "sent_as",
+    )  # fmt: skip
 
     def __init__(self, command: Command, request: Framed, at: float, deadline: float) -> None:
         self.command = command
@@ -78,6 +82,36 @@ class _Pending:
         self.answers = Answers(command.many, request) if command.many is not None else None
         self.answered = command.response is None
         self.reported = self.answered
+        #: The dialogue, None for a request and its response and after the end.
+        self.dialogue = Progress(command) if command.steps else None
+        #: What the master has sent last, and the place of it in the dialogue.
+        self.sent = request
+        self.sent_as = -1
+
+    def follows(self, request: Framed, now: float) -> bool:
+        """Pass over a frame of the master in a dialogue; return whether it was due."""
+        dialogue = self.dialogue
+        if dialogue is None or address_of(request) != address_of(self.request):
+            return False
+        before = dialogue.at
+        if not dialogue.take(request, sent=True):
+            return False
+        self.at, self.sent, self.sent_as = now, request, before
+        return True
+
+    def due(self, response: Framed) -> bool:
+        """Whether an answer is due in a dialogue before its response."""
+        dialogue = self.dialogue
+        if dialogue is None or not dialogue.receives or dialogue.is_last_answer:
+            return False
+        return type(response) is dialogue.due
+
+    def early(self, response: Framed) -> bool:
+        """Whether the response of a dialogue is not due yet."""
+        dialogue = self.dialogue
+        return (
+            dialogue is not None and not dialogue.is_last_answer and type(response) is self.command.response
+        )
 
 
 class Monitor:
@@ -142,7 +176,7 @@ class Monitor:
             pending.reported = True
             answers = pending.answers
             if answers is None or not (answers.timed and answers.items):  # otherwise that was their end
-                self.heard.append(Unanswered(now, pending.request))
+                self.heard.append(Unanswered(now, pending.sent))
 
     def _sort(
         self, asking: Sequence[Framed | Fault], answering: Sequence[Framed | Fault], now: float
@@ -181,7 +215,9 @@ class Monitor:
             self.heard.append(Stray(now, response, late=False))
 
     def _fits(self, pending: _Pending, response: Framed) -> bool:
-        if not answers(pending.command, pending.request, response):
+        if pending.due(response):
+            return address_of(response) == address_of(pending.request)
+        if pending.early(response) or not answers(pending.command, pending.request, response):
             return False
         accepts = self._accepts.get(pending.command.name)
         if accepts and type(response) is pending.command.response:
@@ -202,32 +238,73 @@ class Monitor:
         delay = now - pending.at
         frame = self._codec.encode(response)
         cut(pending.command, pending.request, response)
-        self.heard.append(Replied(now, pending.request, response, delay, late, frame))
+        self.heard.append(Replied(now, pending.sent, response, delay, late, frame))
 
     def _further_deadline(self, pending: _Pending, response: Framed, now: float) -> float | None:
         """Return the time until which another answer may follow this one, None if it is the last."""
         reply, answers = pending.command.replies.get(type(response)), pending.answers
+        if pending.dialogue is not None:
+            return self._further_in_dialogue(pending, pending.dialogue, response, now)
         if reply is not None and reply.meaning(response) == "pending":
             return now + self._timing.patience(pending.command, reply)
         if answers is None or type(response) is not pending.command.response or answers.take(response):
             return None
         return pending.deadline if answers.timed else now + self._timing.deadline(pending.command, 0)
 
+    def _further_in_dialogue(
+        self, pending: _Pending, dialogue: Progress, response: Framed, now: float
+    ) -> float | None:
+        reply = pending.command.replies.get(type(response))
+        if dialogue.take(response, sent=False):
+            if not dialogue.ended:
+                return self._awaited(pending, dialogue, now)
+        elif reply is not None and reply.meaning(response) == "pending":
+            return now + self._timing.patience(pending.command, reply)
+        elif reply is not None and reply.meaning(response) == "again" and pending.sent_as >= 0:
+            dialogue.at = pending.sent_as
+            return self._awaited(pending, dialogue, now)
+        pending.dialogue = None
+        return None
+
+    def _awaited(self, pending: _Pending, dialogue: Progress, now: float) -> float:
+        """Return the time until which an answer is due in a dialogue; nothing is late if the master is."""
+        pending.reported = dialogue.sends
+        step = pending.command.steps[dialogue.at]
+        return now + self._timing.step(step)
+
     def _asked(self, request: Framed, now: float) -> None:
         command = self._commands.get(type(request))
+        if command is None and self._continued(request, now):
+            return
         if command is None:  # a message outside commands: sent by any node, without a response
             self.heard.append(Stray(now, request, late=False))
             return
         before = self._pending
         if before is not None and not before.reported:  # the master did not wait for the deadline
-            self.heard.append(Unanswered(now, before.request))
+            self.heard.append(Unanswered(now, before.sent))
         repeat = before is not None and not before.answered and before.request == request
         unanswerable = not addresses_that_answer(command, request, self._codec.BUS)
         self._pending = _Pending(command, request, now, now + self._timing.deadline(command, 0))
         if command.many is not None:
             self._pending.deadline += self._timing.duration(command.many)
         self._pending.answered = self._pending.reported = unanswerable
+        if self._pending.dialogue is not None:
+            self._pending.reported = self._pending.dialogue.sends
         self.heard.append(Asked(now, request, repeat, self._codec.encode(request)))
+
+    def _continued(self, request: Framed, now: float) -> bool:
+        """Note a later frame of a dialogue; return whether it is one."""
+        pending = self._pending
+        if pending is None or not pending.follows(request, now):
+            return False
+        dialogue = pending.dialogue
+        assert dialogue is not None
+        if dialogue.ended:
+            pending.answered = pending.reported = True
+        else:
+            pending.deadline = self._awaited(pending, dialogue, now)
+        self.heard.append(Asked(now, request, repeat=False, frame=self._codec.encode(request)))
+        return True
 
 
 def _same_frames(

@@ -76,4 +76,5 @@ class Pending:
         """Whether a message from a node has the class and address of an answer, to any attempt."""
         command = self.command
         known = type(message) is command.response or type(message) in command.replies
+        known = known or any(type(message) is kind for _, kind, _ in command.definition.steps)
         return known and self.from_asked(node)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from typing import Any, Literal, Protocol
 
 from qlinkgen.link.codec import Codec, Framed, Message, address_of, is_message, wrong_size
 from qlinkgen.link.echo import EchoCanceller
 from qlinkgen.link.numbering import numbering_of
+from qlinkgen.link.slave_dialogue import Answers, Handling, Refusal, SlaveDialogue
+
+__all__ = ["Node", "Refusal", "SlaveCounters", "SlaveEngine"]
 
 
 class Node(Protocol):
@@ -17,21 +20,13 @@ class Node(Protocol):
     number: int
 
     # Any: a node handles only messages of its own protocol.
-    def handle(self, request: Any, now: float) -> Message | Sequence[Message] | None:
-        """Execute a request; return its answer, a list of several, or None to send nothing."""
+    def handle(self, request: Any, now: float) -> Answers | Handling:
+        """Execute a request; return its answer, a list of several, or None to send nothing.
+
+        A dialogue is a generator: it yields the answers to the request, gets the next frame of the
+        master as the value of the `yield`, and so on. It returns the answers to the last frame.
+        """
         ...
-
-
-class Refusal(Exception):  # the outcome of a request, not an error of the program
-    """Raised by a handler to answer with another reply than the response.
-
-    Attributes:
-        reply: message of a reply of the command, as the schema describes it.
-    """
-
-    def __init__(self, reply: Message) -> None:
-        super().__init__(reply)
-        self.reply = reply
 
 
 class SlaveCounters:
@@ -42,18 +37,20 @@ class SlaveCounters:
         broadcasts: requests to all nodes.
         answers: responses handed to the port.
         replaced: responses discarded because another frame arrived before they were sent.
+        untimely: frames of a dialogue that were not due, or came too late.
         foreign: frames to and from other nodes.
         damaged: damaged frames, by kind. The answers of other nodes are decoded as requests and often count
             here.
     """
 
-    __slots__ = ("answers", "broadcasts", "damaged", "foreign", "replaced", "requests")
+    __slots__ = ("answers", "broadcasts", "damaged", "foreign", "replaced", "requests", "untimely")
 
     def __init__(self) -> None:
         self.requests = 0
         self.broadcasts = 0
         self.answers = 0
         self.replaced = 0
+        self.untimely = 0
         self.foreign = 0
         self.damaged: dict[str, int] = {}
 
@@ -110,6 +107,12 @@ class SlaveEngine:
             command.request: command.addressing == "answered_broadcast" for command in codec.COMMANDS.values()
         }
         self._sized = {command.request: command for command in codec.COMMANDS.values() if command.sizes}
+        self._dialogues = {each.request: each for each in codec.COMMANDS.values() if each.steps}
+        #: Classes of the frames of masters that are only part of dialogues.
+        self._parts = {
+            kind for each in self._dialogues.values() for who, kind, _ in each.steps if who == "send"
+        }
+        self._dialogue: SlaveDialogue | None = None
         self._decoder = codec.StreamDecoder("request")
         self._turnaround = turnaround
         speed = baud or codec.BUS.baud
@@ -143,27 +146,73 @@ class SlaveEngine:
         address = address_of(request)
         if address is not None and address == self._broadcast:
             self.counters.broadcasts += 1
+            self._leave()
             response = self._handled(request, now)
             if not self._answering[type(request)]:
                 return
         elif address is None or address == self.node.number:
             self.counters.requests += 1
-            response = self._handled(request, now)
+            handled = self._handled if not self._dialogues else self._in_dialogue
+            response = handled(request, now)
         else:
             self.counters.foreign += 1
             return
         self._request = request
         if response is not None:
-            self._queue(request, response)
+            self._queue(request, response, now)
             inserted = self._encode(request)[-1:] != self._last
             self._due = now + self._turnaround + (self._byte_time if inserted else 0.0)
 
-    def _queue(self, request: Framed, response: Message | Sequence[Message]) -> None:
+    def _in_dialogue(self, request: Framed, now: float) -> Answers:
+        """Return the answers to a frame that may begin, continue or end a dialogue."""
+        dialogue = self._dialogue
+        if dialogue is not None and dialogue.hears(request, now):
+            return dialogue.answer_to(request)
+        self._leave()
+        if type(request) in self._parts:
+            self.counters.untimely += 1
+            return None
+        command = self._dialogues.get(type(request))
+        if command is None:
+            return self._handled(request, now)
+        try:
+            handling = self.node.handle(request, now)
+        except Refusal as refusal:
+            return refusal.reply
+        if isinstance(handling, Generator):
+            self._dialogue = dialogue = SlaveDialogue(command, request, handling)
+            return dialogue.begin()
+        self._dialogue = SlaveDialogue(command, request, None)
+        at_once: Answers = handling
+        return at_once
+
+    def _leave(self) -> None:
+        if self._dialogue is not None:
+            self._dialogue.leave()
+            self._dialogue = None
+
+    def _await_next(self, sent: Sequence[bytes], now: float) -> None:
+        """Set the time until which the next frame of a dialogue is awaited."""
+        dialogue = self._dialogue
+        if dialogue is None or dialogue.within is None or not dialogue.sends:
+            return
+        assert dialogue.due is not None
+        size = sum(map(len, sent)) + dialogue.due.MAX_WIRE_SIZE
+        byte_times, seconds = dialogue.within
+        dialogue.until = now + self._turnaround + (size + byte_times) * self._byte_time + seconds
+
+    def _queue(self, request: Framed, response: Message | Sequence[Message], now: float) -> None:
         """Encode one answer or several; the further ones follow the first."""
         several: Sequence[Message] = response if isinstance(response, list | tuple) else (response,)
+        asked = request
+        if (dialogue := self._dialogue) is not None:
+            asked = dialogue.request
+            dialogue.until = None
+            dialogue.check(several)
         for each in several:
-            self._check(request, each)
+            self._check(asked, each)
         self._further = [self._encoded(request, each) for each in several]
+        self._await_next(self._further, now)
         self._answer = self._further.pop(0) if several else b""
 
     def _encoded(self, request: Framed, response: Message) -> bytes:
@@ -183,16 +232,18 @@ class SlaveEngine:
                 f"{asked} of the request asks for {getattr(request, asked)}"
             )
 
-    def _handled(self, request: Framed, now: float) -> Message | Sequence[Message] | None:
+    def _handled(self, request: Framed, now: float) -> Answers:
         try:
-            return self.node.handle(request, now)
+            handled: Any = self.node.handle(request, now)  # Any: no generator, without a dialogue
         except Refusal as refusal:
             return refusal.reply
+        answers: Answers = handled
+        return answers
 
     def answer(self, request: Framed, response: Message | Sequence[Message], now: float) -> None:
         """Send the answer to a request that its handler did not answer; too late after another request."""
         if request is self._request:
-            self._queue(request, response)
+            self._queue(request, response, now)
             self._due = max(self._due, now)
         else:
             self.counters.replaced += 1

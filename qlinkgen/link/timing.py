@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from qlinkgen.link.codec import Command, Many, Module, OtherReply, meanings
+from qlinkgen.link.codec import Command, Framed, Many, Module, OtherReply, StepSpan, meanings
 from qlinkgen.link.echo import PROBE
 
 #: Byte times after which a line counts as quiet; also Q.link's response time.
@@ -69,7 +69,7 @@ class Timing:
         commands = codec.COMMANDS.values()
         if not commands:
             raise ValueError("the schema has no commands, so it has no deadlines")
-        longest = max(max(each.request.MAX_WIRE_SIZE, _longest_answer(each)) for each in commands)
+        longest = max(*map(_longest_request, commands), *map(_longest_answer, commands))
         plain = cls(speed, codec.BUS.bits_per_byte, host_slack, longest, paced, attempts)
         return replace(plain, longest_allowance=max(map(plain.allowance, commands)))
 
@@ -108,6 +108,11 @@ class Timing:
         """Return the time in which several answers come, if that is their end."""
         return self._time(*many.within) if many.within is not None else 0.0
 
+    def step(self, step: tuple[str, type[Framed], StepSpan | None]) -> float:
+        """Return the time until a frame of a dialogue is complete, after the one before it."""
+        _, message, within = step
+        return self.on_wire(message.MAX_WIRE_SIZE) + self._time(*within or (0.0, 0.0)) + self.host_slack
+
     def pause(self, reply: OtherReply) -> float:
         """Return the time until a request is sent again, if a reply asks for it."""
         return self._time(*reply.after)
@@ -137,7 +142,7 @@ class Timing:
     def worst_case(self, command: Command, attempts: int | None = None) -> float:
         """Return the longest duration of a call in seconds, for any traffic on the line.
 
-        Infinite for several answers whose end the device decides.
+        Infinite for several answers whose end the device decides. Functions that make frames take no time.
 
         The first term is the delay before the first attempt: an aborted request that may still be answered (a
         broadcast that is still being sent takes less), or the probe for an echo, with a quiet line before it.
@@ -145,6 +150,8 @@ class Timing:
         given_up = self.on_wire(2 * self.longest_frame) + self.longest_allowance + self.host_slack
         search = self.quiet_limit + self.on_wire(len(PROBE)) + self.quiet
         attempt = self.quiet_limit + self.deadline(command)
+        for step in command.steps:
+            attempt += self.step(step) + (self.quiet_limit if step[0] == "send" else 0.0)
         many = command.many
         if many is not None:
             endless = many.until is not None or many.reply is not None
@@ -162,8 +169,15 @@ class Timing:
 
 def _longest_answer(command: Command) -> int:
     """Return the size of the longest answer on the wire, 0 without one."""
-    answers = (command.response, *(reply.message for reply in command.replies.values()))
+    answers = [command.response, *(reply.message for reply in command.replies.values())]
+    answers += [message for who, message, _ in command.steps if who == "receive"]
     return max((answer.MAX_WIRE_SIZE for answer in answers if answer is not None), default=0)
+
+
+def _longest_request(command: Command) -> int:
+    """Return the size of the longest frame of a master on the wire."""
+    messages = [command.request, *(message for who, message, _ in command.steps if who == "send")]
+    return max(int(message.MAX_WIRE_SIZE) for message in messages)
 
 
 def check_attempts(attempts: int) -> int:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, final
 
 from qlinkgen.errors import LinkError
 from qlinkgen.link.codec import Command, Framed
+from qlinkgen.link.dialogue import Dialogue
 from qlinkgen.link.timing import Timing
 
 
@@ -22,13 +23,13 @@ class Packet(NamedTuple):
 
 
 #: A request of a master or a host.
-Question = Framed | Packet
+Question = Framed | Packet | Dialogue
 
 
 class Reply(NamedTuple):
     """The outcome of a successful transaction."""
 
-    #: None for a request without a response.
+    #: None for a request without a response, a list of several answers, a tuple of those in a dialogue.
     response: Any  # of the request's response class; the calls of a generated bus module have its type
     #: Number of transmissions of the request.
     attempts: int
@@ -49,7 +50,7 @@ class CommandTiming:
 
     __slots__ = (
         "accepts", "allowance", "answer_time", "answers_broadcast", "definition", "echoes", "many", "plain",
-        "replies", "response", "sizes", "tries",
+        "replies", "response", "sizes", "step_times", "tries",
     )  # fmt: skip
 
     def __init__(self, command: Command, timing: Timing, accepts: Accepts | None) -> None:
@@ -61,13 +62,15 @@ class CommandTiming:
         self.replies = command.replies
         #: Class of the response if it answers in any case, whatever is in it, and is the only one.
         self.plain = command.response
-        if command.many is not None or command.response in command.replies:
+        if command.many is not None or command.steps or command.response in command.replies:
             self.plain = None
         self.many = command.many
         self.answers_broadcast = command.addressing == "answered_broadcast"
         self.allowance = timing.gap(command)
         self.answer_time = timing.deadline(command, 0)
         self.tries = timing.attempts_of(command)
+        #: Time until each frame of a dialogue after its request, or after the one before it.
+        self.step_times = tuple(timing.step(step) for step in command.steps)
 
 
 def settled(outcome: Reply | LinkError | None) -> Reply:

@@ -71,6 +71,11 @@ class MessageBuilder:
             return self._frame.address is not None
         return isinstance(self._frame, MarkedFrame)
 
+    @property
+    def repeated(self) -> tuple[str, ...]:
+        """Values of the frame that answers repeat."""
+        return self._echoed("response")
+
     def directed(
         self, name: str, spec: CommandSpec, layout: Written, *, addressing: Addressing, section: str
     ) -> Message:

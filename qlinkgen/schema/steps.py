@@ -111,6 +111,7 @@ class StepBuilder:
         """Whether a command may have steps; reports why not."""
         several = asked.addressing not in ("node", "none")
         spec, path = asked.spec, asked.path
+        echo = ", ".join(self._messages.repeated)
         faults = {
             "many": (spec.many is not None, "it has several answers", "write each as a step, or remove many"),
             "addressing": (several, "it may be broadcast", "use addressing: node"),
@@ -120,6 +121,7 @@ class StepBuilder:
                 "its frame has no parts",
                 "describe a frame with parts",
             ),
+            "echo": (bool(echo), f"answers repeat the {echo} of one request", "remove echo from the part"),
             "in_flight": (
                 (spec.in_flight or 1) > 1,
                 "it may have several requests at once",
@@ -128,7 +130,7 @@ class StepBuilder:
         }
         for key, (wrong, why, hint) in faults.items():
             if wrong:
-                needs = (path, (key,) if key in ("bus", "frame") else (*path[:-1], key))
+                needs = (path, (key,) if key in ("bus", "frame") else (*path[:-1], key), ("frame",))
                 what = f"{asked.name} cannot be a dialogue of several frames: {why}"
                 self._report.error(_RULE, path, what, hint, of_key=True, needs=needs)
                 return False

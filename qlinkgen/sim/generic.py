@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from qlinkgen.link.codec import Codec, Command, Framed, Many, Message
+from qlinkgen.link.slave_dialogue import Handling
 
 #: Name of a rule class of a generated module to its smallest legal value.
 _SMALLEST: Mapping[str, Callable[[Any], object]] = {  # Any: a rule of the module's own, of the class named
@@ -51,7 +52,7 @@ class GenericNode:
         self,
         request: Framed,
         now: float,  # noqa: ARG002  # the interface of nodes
-    ) -> Message | list[Message] | None:
+    ) -> Message | list[Message] | Handling | None:
         """Return the response or responses to a request; None if the command has none or is unknown."""
         self.requests += 1
         command = self._commands.get(type(request))
@@ -60,6 +61,8 @@ class GenericNode:
         sizes: dict[str, object] = {}
         for name, asked, _ in command.sizes:
             sizes |= _items(command.response, name, getattr(request, asked))
+        if command.steps:
+            return self._talk(command, request, sizes)
         if command.many is None:
             return self._answer(command.response, request, command.echoes, sizes)
         return self._several(command, command.many, request, sizes)
@@ -77,6 +80,20 @@ class GenericNode:
         if many.reply is None:
             return [one] * (count or 1)
         return [one, self._answer(many.reply, request, command.replies[many.reply].echoes, {})]
+
+    def _talk(self, command: Command, request: Framed, sizes: Mapping[str, object]) -> Handling:
+        """Yield the answers to each frame of a dialogue."""
+        answers: list[Message] = []
+        for who, kind, _ in command.steps:
+            if who == "send":
+                yield answers
+                answers = []
+            else:
+                last = kind is command.response
+                answers.append(
+                    self._answer(kind, request, command.echoes if last else (), sizes if last else {})
+                )
+        return answers
 
     def _answer(
         self, kind: type[Message], request: Framed, echoes: Iterable[str], given: Mapping[str, object]

@@ -238,7 +238,8 @@ class _Maker:
             number = self._answer_id(shape, asked, used, relative=rng.random() < 0.5)
             if number is not None:
                 spec["replies"] = {self.words.name(taken): self._reply(shape, maker, number)}
-        if shape.kind != "marked" and shape.bus == "master_slave" and rng.random() < 0.5:
+        plain = shape.kind != "marked" and shape.bus == "master_slave" and "echo" not in str(shape.frame)
+        if plain and rng.random() < 0.5:
             self._dialogue(shape, maker, found, used)
 
     def _dialogue(self, shape: Shape, maker: FieldMaker, found: Doc, used: set[tuple[str, int]]) -> None:
