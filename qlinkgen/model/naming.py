@@ -21,13 +21,17 @@ _IN_FUNCTIONS = frozenset(
     wrong_size""".split()  # noqa: SIM905 - reads better than quoted words
 )
 #: Attributes of the classes of calls and handlers, and types of arguments.
-_IN_CALLS = frozenset("ask tell handle number axis bool bytes float int list str type".split())  # noqa: SIM905
+_IN_CALLS = frozenset(
+    """ask ask_any ask_many ask_steps tell handle number axis bool bytes float int list str
+    tuple type""".split()  # noqa: SIM905
+)
 #: Classes, constants and imports of a codec, and constants in the body of a message class.
 _IN_MODULE = frozenset(
     """Message Request Response StreamDecoder Command Counters Fault CodecError EncodeError DecodeError
     Codec Bus OpenEnum BaseMessage ArrayRule BytesRule ConstantRule CountRule IntRule MaskRule
     ScaledRule TextRule RecordRule RecordsRule BaseRecord MaybeRule Misplaced NEW Rule OutOfRange Scale
-    DecimalScale Marking Struct Decimal Self Any Callable BytesLike ClassVar Final Literal LayoutError
+    DecimalScale Marking Struct Decimal Self Any Callable Generator Sequence BytesLike ClassVar Final
+    Literal LayoutError
     Checksum BUS COMMANDS MESSAGES RECORDS MARKING REFUSALS UNREAD UNREADABLE NAME ID FIELDS RULES
     ADDRESS EMPTY CHECKED""".split()  # noqa: SIM905
 ) | frozenset(dir(builtins))

@@ -91,12 +91,14 @@ int main(int count, char **asked)
 """
 
 
-def built(folder: Path, compiler: str, *options: str) -> Path:
-    protocol, faults = loads(SCHEMA, "pump.yaml")
+def built(
+    folder: Path, compiler: str, *options: str, schema: str = SCHEMA, text_of_main: str = PROGRAM
+) -> Path:
+    protocol, faults = loads(schema, "pump.yaml")
     assert protocol is not None, faults
     for name, text in c.generate(protocol, Options()).items():
         (folder / Path(name).name).write_text(text)
-    (folder / "main.c").write_text(PROGRAM)
+    (folder / "main.c").write_text(text_of_main)
     program = folder / "main"
     command = [compiler, *options, *WARNINGS, "-I", str(folder), str(folder / "main.c"), "-o", str(program)]
     subprocess.run(command, check=True)

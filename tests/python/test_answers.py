@@ -14,7 +14,7 @@ from qlinkgen.backends.base import Options
 from qlinkgen.backends.python import bus
 from qlinkgen.backends.python import generate as generate_codec
 from qlinkgen.errors import NoReply, Refused
-from qlinkgen.link import MasterEngine, Refusal, SlaveEngine, Timing
+from qlinkgen.link import Dialogue, MasterEngine, Refusal, SlaveEngine, Timing
 from qlinkgen.schema import load
 from qlinkgen.sim import VirtualPort, Wire
 from qlinkgen.transport.blocking import BlockingMaster
@@ -24,7 +24,8 @@ PACKAGE = "answers_of_the_tests"
 PROGRAM = f"""
 from __future__ import annotations
 
-from typing import assert_type
+from collections.abc import Generator
+from typing import Any, assert_type
 
 from {PACKAGE} import answers as codec
 from {PACKAGE} import answers_bus as bus
@@ -41,11 +42,22 @@ class Slave(bus.SlaveHandlers):
     ) -> list[codec.LogResponse | codec.LogFault | codec.Busy | codec.LogEnd]:
         return [codec.LogResponse(node=self.number, entry=1), codec.LogEnd(node=self.number)]
 
+    def transfer(
+        self, request: codec.TransferRequest, now: float
+    ) -> Generator[codec.Ack, Any, codec.TransferWritten]:
+        place: codec.TransferPlace = yield codec.Ack(node=self.number)
+        block: codec.TransferBlock = yield codec.Ack(node=self.number)
+        size = place.start + len(block.data)
+        return codec.TransferWritten(node=self.number, number=request.number, size=size)
+
 
 def sync(calls: bus.MasterCalls, node: bus.NodeCalls) -> None:
     assert_type(calls.read(3, number=1, quantity=2), codec.ReadResponse | codec.ReadPartly)
     assert_type(node.log(number=1), list[codec.LogResponse])
     assert_type(node.clear(number=1), codec.Ack)
+    place = codec.TransferPlace(node=3, start=1)
+    told = calls.transfer(3, number=1, place=place, block=lambda _: codec.TransferBlock(node=3, data=b"1"))
+    assert_type(told, tuple[codec.Ack, codec.Ack, codec.TransferWritten])
 
 
 async def asynchronous(calls: bus.AsyncMasterCalls) -> None:
@@ -75,6 +87,15 @@ def test_mypy_strict_is_content(written: Path) -> None:
     command = [sys.executable, "-m", "mypy", "--strict", "-p", PACKAGE, "-m", "program"]
     done = subprocess.run(command, cwd=written, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
+
+
+def transferring(codec: Any, request: Any) -> Any:
+    """A dialogue, refused at its second frame if that begins at 0."""
+    place = yield codec.Ack(node=3)
+    if place.start == 0:
+        raise Refusal(codec.TransferFault(node=3, number=request.number, reason=1))
+    block = yield codec.Ack(node=3)
+    return codec.TransferWritten(node=3, number=request.number, size=place.start + len(block.data))
 
 
 def slave_of(codec: Any, calls: Any) -> Any:
@@ -112,6 +133,8 @@ def slave_of(codec: Any, calls: Any) -> Any:
         def find(self, request: Any, now: float) -> Any:
             return [codec.FindResponse(node=self.number, serial=1000 + self.number)]
 
+        transfer = staticmethod(lambda request, now: transferring(codec, request))
+
     return Slave(3)
 
 
@@ -128,6 +151,9 @@ def test_calls_and_handlers(modules: tuple[Any, Any]) -> None:
 
         ask_many = ask_any = ask
 
+        def ask_steps(self, request: Any, further: Any) -> Any:
+            return master.transact(Dialogue(request, further)).response
+
         def tell(self, request: Any) -> None:
             master.transact(request)
 
@@ -140,6 +166,11 @@ def test_calls_and_handlers(modules: tuple[Any, Any]) -> None:
     assert pump.write(0, number=1, value=2) is None
     assert [each.entry for each in pump.log(3, number=3)] == [0, 1, 2]
     assert [each.serial for each in pump.find(0, number=1)] == [1003]
+    block = codec.TransferBlock(node=3, data=b"123")
+    told = pump.transfer(3, number=1, place=codec.TransferPlace(node=3, start=5), block=lambda _: block)
+    assert told == (codec.Ack(node=3), codec.Ack(node=3), codec.TransferWritten(node=3, number=1, size=8))
+    with pytest.raises(Refused, match="number 1, reason unknown"):
+        pump.transfer(3, number=1, place=codec.TransferPlace(node=3, start=0), block=block)
     refusals = {"read": "number 9, reason unknown", "clear": "number 9, reason unknown"}
     for name, reason in refusals.items():
         with pytest.raises(Refused) as caught:

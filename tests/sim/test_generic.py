@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -37,7 +38,7 @@ def test_every_command(path: Path) -> None:
             assert response is None
         elif command.many is None:
             assert response is not None
-            assert not isinstance(response, list)
+            assert not isinstance(response, list | Generator)
             assert codec.encode(response)
             assert answers(command, request, response)
             assert address_of(response) == number

@@ -92,6 +92,9 @@ class Transaction:
     #: Answers other than the response; `done` are those that a call returns.
     others: tuple[MessagePlan, ...] = ()
     done: tuple[MessagePlan, ...] = ()
+    #: Of a dialogue, what the master sends after the request, and the answers of the slave in their order.
+    further: tuple[MessagePlan, ...] = ()
+    answers: tuple[MessagePlan, ...] = ()
 
     @classmethod
     def of(cls, plan: Plan, command: Command) -> Transaction | None:
@@ -104,7 +107,12 @@ class Transaction:
         others = tuple(plan.by_name[each.message.name] for each in kept)
         ends = () if command.many else kept  # of several answers: it is not one of them
         done = tuple(plan.by_name[each.message.name] for each in ends if "done" in each.meanings)
-        return cls(command, request, response, others, done) if response else None
+        if response is None:
+            return None
+        steps = [(step.sent, plan.by_name[step.message.name]) for step in command.steps]
+        further = tuple(message for sent, message in steps if sent)
+        answers = tuple(message for sent, message in steps if not sent)
+        return cls(command, request, response, others, done, further, answers)
 
     @property
     def name(self) -> str:
@@ -127,6 +135,7 @@ class BusView:
     nodes: str
     others: bool
     many: bool
+    dialogues: bool
 
 
 class BusModule:
@@ -168,6 +177,7 @@ class BusModule:
             nodes=f", {self._nodes()}" if self._nodes() else "",
             others=any(each.done for each in self._transactions),
             many=any(each.command.many for each in self._transactions),
+            dialogues=any(each.command.steps for each in self._transactions),
         )
         template = templates().get_template("templates/bus.j2")
         return fitted(template.render(vars(view)).rstrip("\n") + "\n")
@@ -188,7 +198,24 @@ class BusModule:
                 self._classes.add(self._place.classes[each.record.name])
             elif not isinstance(each, BytesStep) and isinstance(each.number.meaning, Enum):
                 self._classes.add(self._place.classes[each.number.meaning.name])
-        return [values.argument(each, self._place) for each in settable]
+        taken = [values.argument(each, self._place) for each in settable]
+        for name, message in self._further(transaction):
+            kind = self._class(message)
+            taken.append(f"{name}: {kind} | Callable[[Sequence[Any]], {kind}]")
+        return taken
+
+    def _further(self, transaction: Transaction) -> list[tuple[str, MessagePlan]]:
+        """Parameters for what the master sends after a request."""
+        names = {attribute(each.name) for each in transaction.request.payload.settable}
+        names |= {self._place.address}
+        found = []
+        for message in transaction.further:
+            name = attribute(message.name.rpartition(".")[2])
+            while name in names:
+                name += "_"
+            names.add(name)
+            found.append((name, message))
+        return found
 
     @staticmethod
     def _given(transaction: Transaction) -> list[str]:
@@ -201,12 +228,16 @@ class BusModule:
         if transaction.response is None:
             return "None"
         names = [self._class(each) for each in (transaction.response, *more)]
+        if transaction.answers:
+            names[0] = f"tuple[{', '.join(self._class(each) for each in transaction.answers)}]"
         if transaction.command.many is not None:
             names[0] = f"list[{' | '.join(names)}]"
         return " | ".join(names if surely else [*names, "None"])
 
     def _ask(self, call: Transaction, wait: str) -> str:
         """The statement that returns the answer."""
+        if call.answers:
+            return f"return {wait}self.ask_steps(_request, [{', '.join(n for n, _ in self._further(call))}])"
         kind = "_many" if call.command.many is not None else "_any" if call.done else ""
         return f"return {wait}self.ask{kind}(_request, {self._asked(call)})"
 
@@ -260,7 +291,7 @@ class BusModule:
         if call.response is None:
             return [*request, f"{wait}self.tell(_request)"]
         ask = [self._ask(call, wait)]
-        if call.done:  # of any class, which `ask` cannot express
+        if call.done or call.answers:  # of any class, which `ask` cannot express
             answer = self._answer(call, call.done, surely=True)
             ask = [f"_answer: {answer} = {ask[0].removeprefix('return ')}", "return _answer"]
         if call.command.addressing != "either" or node:
@@ -278,6 +309,10 @@ class BusModule:
         entries = [first] if first else []
         pairs = zip(call.request.message.values, call.request.payload.settable, strict=True)
         entries += [f"{attribute(v.name)}: {values.description(v, each, self._place)}" for v, each in pairs]
+        entries += [
+            f"{name}: {class_name(message)} to send, or a function that makes it from the answers so far."
+            for name, message in self._further(call)
+        ]
         lines = [line for entry in entries for line in docstrings.item(entry, WIDTH - 8)]
         return ["", "Args:", *lines] if lines else []
 
@@ -343,8 +378,16 @@ class BusModule:
     def _handler(self, call: Transaction) -> Method:
         command = call.command
         arguments = ["self", f"request: {self._class(call.request)}", "now: float"]
-        head = wrapped(f"def {call.name}(", arguments, f") -> {self._answer(call, call.others)}:", 4)
+        answer = self._answer(call, call.others)
+        if call.answers:
+            answer = " | ".join(["_Handling", *(self._class(each) for each in call.others), "None"])
+        head = wrapped(f"def {call.name}(", arguments, f") -> {answer}:", 4)
         doc = _summary(command)
+        if call.answers:
+            frames = ", ".join(self._class(each) for each in call.further)
+            gets = f" Each `yield` gives the next frame: {frames}." if frames else ""
+            text = f"A dialogue: a generator of the answers to each frame, the last of them returned.{gets}"
+            doc += ["", *textwrap.wrap(text, WIDTH - 8)]
         if command.echoes:
             doc += ["", f"The response repeats {' and '.join(command.echoes)} of the request."]
         if command.response and command.addressing == "either":
