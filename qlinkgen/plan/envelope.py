@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from qlinkgen.model.frame import ATTRIBUTE
+from qlinkgen.plan.check import Check
 from qlinkgen.plan.parts import (
     AddressPart,
     AddressSlot,
@@ -112,6 +113,12 @@ class Envelope:
     def blocks(self) -> BlocksPart | None:
         """The check values of the blocks of the payload, None if there are none."""
         return next((part for part in self.parts if isinstance(part, BlocksPart)), None)
+
+    @cached_property
+    def algorithms(self) -> tuple[Check, ...]:
+        """The check values, the main one first, each algorithm perhaps several times."""
+        checks = [part.check for part in sorted(self.checks, key=lambda part: part is not self.check)]
+        return tuple(checks + ([self.blocks.check] if self.blocks else []))
 
     @cached_property
     def header_checks(self) -> tuple[CheckPart, ...]:

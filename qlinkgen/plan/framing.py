@@ -82,16 +82,17 @@ class FramePlan:
 
     @property
     def search(self) -> Mapping[str, object]:
-        """What the search for frames depends on, by its name in error messages."""
-        envelope, end = self.envelope, self.end
+        """What one receiver needs to find the frames of both directions, by its name in error messages."""
+        envelope, end, way = self.envelope, self.end, self.transparency
         check = envelope.check
         return {
-            f"a first constant {envelope.preamble.hex(' ').upper()}": envelope.preamble,
-            "a check value": bool(envelope.checks or envelope.blocks),
+            "their first constant": envelope.preamble,
+            "their main check value": check.check.algorithm if check else None,
             "check values of blocks": envelope.blocks is not None,
-            "a covered attribute": bool(envelope.seeded),
-            "a check value of the header": check is not None and check in envelope.header_checks,
-            "parts after the terminator": isinstance(end, ByTerminator) and end.after > 0,
+            "covered attributes": bool(envelope.seeded),
+            "a main check value before the payload": check is not None and check in envelope.header_checks,
+            "bytes after the terminator": isinstance(end, ByTerminator) and end.after > 0,
+            "unstuffed parts at the end": isinstance(way, FrameStuffing) and way.back > 0,
         }
 
     @property

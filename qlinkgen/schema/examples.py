@@ -63,7 +63,8 @@ class _Checker:
         parts = {each: value for each, value in spec.parts.items() if each != key}
         self._compare_address(message, decoded, parts, path)
         beside = {member.name: member for _, member in decoded.message.envelope.values}
-        names = {_key(value.name): (value, beside[value.name]) for value in self._protocol.frame_values}
+        every = self._protocol.beside(message)
+        names = {_key(value.name): (value, beside[value.name]) for value in every}
         self._compare("the frame", names, decoded.beside, parts, path)
         steps = zip(message.values, decoded.message.payload.settable, strict=True)
         inside = {value.name: (value, step) for value, step in steps}

@@ -22,6 +22,7 @@ from pydantic_core import CoreSchema
 from qlinkgen.schema.file_base import BRANCH, Fact, FileMapping, Names
 from qlinkgen.schema.file_fields import BitSpec
 from qlinkgen.schema.kinds import (
+    AnyCondition,
     AnyRange,
     ByteCount,
     ByteText,
@@ -184,6 +185,9 @@ class PartSpec(Fact):
     only: list[str] | None = Field(default=None, description="Messages with the checksum; default: all")
     words: Annotated[StrictInt, Field(ge=1, le=8)] = Field(1, description="Size of the words that a sum adds")
     rejected: Id | None = Field(default=None, description="Check value that rejects an unknown command")
+    when: AnyCondition | None = Field(
+        default=None, alias="if", description="Direction of the frames that have it: {direction: response}"
+    )
 
     @property
     def told(self) -> PartKind | None:

@@ -11,6 +11,7 @@ from qlinkgen.schema.coding import CodingBuilder
 from qlinkgen.schema.file_frames import MarkedSpec, PartSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
+from qlinkgen.schema.part_directions import check_directions
 from qlinkgen.schema.parts import PartBuilder
 from qlinkgen.schema.pieces import MAX_ID_BITS, placed
 from qlinkgen.schema.report import Reporter, listed
@@ -80,6 +81,15 @@ class FrameBuilder:
         if spec.coding is not None and spec.parts is None:
             what = "'coding' applies only to frames of parts"
             self._parts.fault("not-applicable", ("frame", "coding"), what, "remove it")
+        others: list[tuple[Path, PartSpec]] = [
+            (("packet", name), each) for name, each in (spec.packet or {}).items()
+        ]
+        if spec.marked and spec.marked.checksum:
+            others.append((("marked", "checksum"), spec.marked.checksum))
+        for place, each in others:
+            if each.when is not None:
+                what = "'if' applies only to frames of parts"
+                self._parts.fault("not-applicable", ("frame", *place, "if"), what, "remove it")
         if spec.parts is not None:
             return self._delimited(spec.parts)
         return self._marked(spec.marked) if spec.marked is not None else self._packet(spec.packet or {})
@@ -105,7 +115,15 @@ class FrameBuilder:
         stuffing = build_stuffing(spec.stuffing, parts, self._parts, self._report) if spec.stuffing else None
         codings = CodingBuilder(parts, self._parts, self._report)
         coding, coded = codings.build(spec.coding)
-        frame = DelimitedFrame(parts, stuffing, coding, coded, silence, spec.doc, spec.section)
+        whole = DelimitedFrame(parts, stuffing, coding, coded, silence, spec.doc, spec.section)
+        if not all(self._fits(whole.towards(each), path) for each in whole.ways):
+            return None
+        if whole.directed:
+            check_directions(whole, specs, self._report)
+        return whole
+
+    def _fits(self, frame: DelimitedFrame, path: Path) -> bool:
+        """Check the frame of a direction; return whether more can be built on it."""
         self._check_pieces(frame, path)
         self._check_order(frame, path)
         self._check_empty(frame, path)
@@ -115,11 +133,11 @@ class FrameBuilder:
         if frame.payload.trim is not None:
             self._check_trim(frame, frame.payload.trim, path)
         if self._is_circular(frame, path):
-            return None
+            return False
         self._check_length(frame, path)
         check_unique(frame, self._report)
         check_terminator_part(frame, self._report)
-        return frame
+        return True
 
     def _check_order(self, frame: DelimitedFrame, path: Path) -> None:
         """Check that what determines the end precedes the payload."""
@@ -233,6 +251,8 @@ class FrameBuilder:
             what = f"{listed([bits.name for bits in frame.id_bits])} have more than {MAX_ID_BITS} bits"
             self._parts.fault("bad-frame", path, what, "give some of them other roles")
         for part in frame.parts:
+            if part.derivation and part.derivation.of not in parts:
+                continue  # reported with the conditions
             source = parts[part.derivation.of] if part.derivation else part
             numeric = source.scalar is not None and source.role != "derived"
             if part.derivation and not (numeric and part.scalar and source.size == part.size):

@@ -284,7 +284,8 @@ class MessageBuilder:
         """Check that a length in steps of several bytes can state the size of the message."""
         if not isinstance(self._frame, DelimitedFrame) or (step := self._frame.length_scale) == 1:
             return
-        bias, hint = self._frame.length_bias, "add a reserved field, or reduce the scale of the length"
+        bias = self._frame.towards(message.direction).length_bias
+        hint = "add a reserved field, or reduce the scale of the length"
         sizes = {message.min_size, 0} if message.empty_is_default else {message.min_size}
         if any((size + bias) % step for size in sizes):
             what = (

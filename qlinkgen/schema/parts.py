@@ -13,6 +13,7 @@ from qlinkgen.schema.file_frames import CrcSpec, PartKind, PartSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.notation import Duration, shown
+from qlinkgen.schema.part_directions import direction_of
 from qlinkgen.schema.pieces import PieceBuilder, text_size
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
@@ -143,6 +144,7 @@ class PartBuilder:
             doc=spec.doc,
             section=spec.section,
             confirmed=spec.confirmed,
+            only=direction_of(spec, self._report, path),
             constant=value,
             shared=spec.shared,
             scalar=scalar,
@@ -191,6 +193,7 @@ class PartBuilder:
             doc=spec.doc,
             section=spec.section,
             confirmed=spec.confirmed,
+            only=direction_of(spec, self._report, path),
         )
 
     def fault(self, rule: str, path: Path, what: str, hint: str) -> None:

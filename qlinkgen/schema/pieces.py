@@ -47,7 +47,8 @@ class PieceBuilder:
 
     def value(self, name: str, spec: PartSpec, path: Path) -> tuple[Scalar, tuple[PartBits, ...]]:
         """The integer of a part without a role, and the values in it."""
-        given = {key: getattr(spec, key) for key in spec.model_fields_set & FieldSpec.model_fields.keys()}
+        keys = spec.model_fields_set & FieldSpec.model_fields.keys() - {"when"}
+        given = {key: getattr(spec, key) for key in keys}
         kind = self._types.build(FieldSpec.model_construct(_fields_set=set(given), **given), path)
         match kind:
             case Bits():
@@ -199,17 +200,19 @@ class IdBuilder:
         pieces = frame.id_bits if isinstance(frame, DelimitedFrame) else ()
         self._direction = next((each for each in pieces if each.role == "direction"), None)
         self._pieces = [each for each in pieces if each.role == "message"]
+        by_parts = isinstance(frame, DelimitedFrame) and frame.directed
+        self._directed = by_parts or self._direction is not None
 
     def number(self, stated: StatedId, direction: Direction, path: Path, whose: str = "") -> int:
         """The id of a message, stated at a path; ``whose`` is its name if it is not that of its command."""
         number = self._stated(stated, path, f" of {whose}" if whose else "")
-        if self._direction is None:
-            return number
-        if direction == "message":
+        if direction == "message" and self._directed:
             what = f"{path[-2]} has no direction, which its frame states"
             hint = "add direction: request or direction: response"
             self._report.error("bad-frame", path[:-1], what, hint, of_key=True, needs=(path[:-1], ("frame",)))
             direction = "request"
+        if self._direction is None:
+            return number
         return number | self._direction.directions[direction] << self._direction.at
 
     def _stated(self, stated: StatedId, path: Path, whose: str) -> int:

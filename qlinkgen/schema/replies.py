@@ -195,7 +195,7 @@ class ReplyBuilder:
                 yield Case(first, last, means, name)
 
     def _switch(self, name: str, message: Message, path: Path) -> Scalar | None:
-        every = self._frame.values if isinstance(self._frame, DelimitedFrame) else ()
+        every = self._frame.towards("response").values if isinstance(self._frame, DelimitedFrame) else ()
         known = {value.name: value.type for value in (*every, *message.values) if not value.field.conditional}
         place, needs = (*path, "switch"), ((*path, "switch"), (*path[:-1], "fields"), ("frame",))
         kind = known.get(name)

@@ -142,6 +142,12 @@ _ALL = (
         "present, or absent wherever it is present. A count has the condition of the field that it counts.",
     ),
     Rule(
+        "part-direction",
+        "A part with `if` is in all frames of one direction, and in none of the other.",
+        "Only the direction decides, and one receiver finds the frames of both: they begin alike and have "
+        "the same roles; what a part counts, covers or equals is there wherever the part is.",
+    ),
+    Rule(
         "bad-record",
         "A record has a fixed size and at least one value.",
         "Arrays of it are divided by that size. Give its fields a number of items, like [4]; a text of "

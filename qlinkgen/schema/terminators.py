@@ -44,9 +44,16 @@ def check_terminator_part(frame: DelimitedFrame, report: Reporter) -> None:
 
 def check_terminator(frame: Frame | None, messages: Sequence[Message], report: Reporter) -> None:
     """Check that some byte of the terminator does not occur between the first part and it."""
-    end = frame.part("terminator") if isinstance(frame, DelimitedFrame) else None
-    if not isinstance(frame, DelimitedFrame) or end is None or report.failed:
+    if not isinstance(frame, DelimitedFrame) or frame.part("terminator") is None or report.failed:
         return
+    for way in frame.ways:
+        sent = [each for each in messages if not frame.directed or each.direction == way]
+        _check_way(frame.towards(way), sent, report)
+
+
+def _check_way(frame: DelimitedFrame, messages: Sequence[Message], report: Reporter) -> None:
+    end = frame.part("terminator")
+    assert end is not None
     inner = frame.parts[: frame.parts.index(end)]
     if inner[0].role == "constant":
         inner = inner[1:]

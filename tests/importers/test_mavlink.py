@@ -315,7 +315,7 @@ def test_frames_are_those_of_pymavlink() -> None:
                 zip((each.name for each in message.values), random_values(message, rng), strict=True)
             )
             wire = codec.encode(
-                message.name, values | random_beside(model, rng), random_address(message, rng)
+                message.name, values | random_beside(model, message, rng), random_address(message, rng)
             )
             read = dialect.MAVLink(None).decode(bytearray(wire))
             assert read.get_type() == message.name.upper()

@@ -93,7 +93,7 @@ class Described:
     def wire(self, message: Message, rng: random.Random) -> bytes:
         """A frame of random values, made by the interpreter."""
         values = dict(zip((each.name for each in message.values), random_values(message, rng), strict=True))
-        values |= random_beside(self.model, rng)
+        values |= random_beside(self.model, message, rng)
         address = random_address(message, rng) if message.addresses else None
         return Codec(self.plan).encode(message.name, values, address)
 

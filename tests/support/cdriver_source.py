@@ -84,9 +84,9 @@ class _Source:
             "    int total;",
         )
         self._add("    (void)node;")
-        if self.protocol.frame_values:
+        if self.protocol.beside(message):
             self._add("    @p@_parts_t parts = @P@_PARTS_INIT;")
-        for value in self.protocol.frame_values:
+        for value in self.protocol.beside(message):
             self._add(*(f"    {line}" for line in _parsed(value, "parts.")))
         for value in message.values:
             if told := _presence(message, value):
@@ -108,7 +108,7 @@ class _Source:
             return self._filled("@p@_request_sum(bytes_a, from_hex(node, bytes_a)), ") if has_sum else ""
         bits = self.header.address_bits
         whom = f"(uint{bits}_t)strtoul(node, NULL, 0), " if bits else ""
-        return f"{whom}&parts, " if self.protocol.frame_values else whom
+        return f"{whom}&parts, " if self.protocol.beside(message) else whom
 
     def _decode(self, message: Message) -> None:
         function, stem = self.names.function(message), self.names.stem(message)
@@ -171,7 +171,7 @@ class _Source:
             else '    printf("ok -");',
             *(
                 f"    {line}"
-                for value in self.protocol.frame_values
+                for value in self.protocol.beside(message)
                 for line in _printed(value, "frame.parts.")
             ),
             shown,
@@ -219,10 +219,18 @@ class _Source:
             self._add("            default: break;", "            }", "        }")
         self._add("        if (status != @P@_OK) {", '            printf("%s", kind_of(status));')
         self._add("        } else {", '            printf("message:%s:", name);', f"            {node}")
-        for value in self.protocol.frame_values:
-            assert isinstance(value.type, Scalar)
-            form, cast = ("%lld", "long long") if value.type.signed else ("%llu", "unsigned long long")
-            self._add(f'            printf("{form}:", ({cast})frame.parts.{naming.member(value.name)});')
+        for direction in self._directions():
+            values = self.protocol.beside(self.protocol.received(direction)[0])
+            if values:
+                self._add(f'            if (strcmp(direction, "{direction}") == 0) {{')
+            for value in values:
+                assert isinstance(value.type, Scalar)
+                form, cast = ("%lld", "long long") if value.type.signed else ("%llu", "unsigned long long")
+                self._add(
+                    f'                printf("{form}:", ({cast})frame.parts.{naming.member(value.name)});'
+                )
+            if values:
+                self._add("            }")
         self._add("            if (frame.size == 0u) { putchar('-'); }")
         self._add(
             "            put_digits(frame.payload, frame.size);",

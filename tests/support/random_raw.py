@@ -20,9 +20,9 @@ def random_values(message: Message, rng: random.Random) -> list[Raw]:
     return [_random(value, rng) for value in message.values]
 
 
-def random_beside(protocol: Protocol, rng: random.Random) -> dict[str, Raw]:
-    """Legal raw values of a frame."""
-    return {value.name: _random(value, rng) for value in protocol.frame_values}
+def random_beside(protocol: Protocol, message: Message, rng: random.Random) -> dict[str, Raw]:
+    """Legal raw values of the frame of a message."""
+    return {value.name: _random(value, rng) for value in protocol.beside(message)}
 
 
 def random_address(message: Message, rng: random.Random) -> int:

@@ -123,11 +123,10 @@ class CheckWriter(Places):
 
     @cached_property
     def algorithms(self) -> Mapping[Checksum, CheckView]:
-        """Each algorithm of the frame, the main one first."""
-        parts = sorted(self.envelope.checks, key=lambda part: part is not self.envelope.check)
-        found = dict.fromkeys(part.check.algorithm for part in parts)
-        if self.envelope.blocks:
-            found[self.envelope.blocks.check.algorithm] = None
+        """Each algorithm of frames, the main one first."""
+        found = dict[Checksum, None]()
+        for envelope in self.every:
+            found |= dict.fromkeys(each.algorithm for each in envelope.algorithms)
         return {each: render(each, number) for number, each in enumerate(found, 1)}
 
     @property
@@ -167,7 +166,7 @@ class CheckWriter(Places):
         )
 
     def _function(self, part: CheckPart) -> str:
-        return f"{self.prefix}_value_{self.envelope.checks.index(part) + 1}_"
+        return f"{self.own}_value_{self.envelope.checks.index(part) + 1}_"
 
     def fills(self, body: str, end: str, payload_end: str) -> list[str]:
         """Statements that compute and write the check values of a body; ``end`` is the end of its payload."""

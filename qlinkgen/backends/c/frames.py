@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import assert_never
 
 from qlinkgen.backends.c import crc, framing
@@ -26,11 +26,13 @@ from qlinkgen.backends.c.views import (
     HuntView,
     InsertView,
     PartsView,
+    PartsViews,
     PlaceView,
     PlainView,
     StuffedView,
     frame_view,
     judgement,
+    own_prefix,
     parts_views,
 )
 from qlinkgen.model.message import Direction
@@ -78,6 +80,8 @@ class FrameSection:
     algorithms: Sequence[crc.CheckView]
     templates: tuple[str, ...]
     receiver: str
+    #: The views of the frames of each direction, if they differ.
+    ways: Mapping[str, PartsViews] = field(default_factory=dict)
 
     @property
     def check(self) -> crc.CheckView | None:
@@ -144,7 +148,8 @@ class FrameSection:
         """The function that makes a whole frame."""
         if self.slave_only:
             return packet_to_frame(names, message)
-        return framing.to_frame(self.plan.frame, names, address, message)
+        own = own_prefix(names.prefix, message.direction if self.ways else "")
+        return framing.to_frame(self.plan.frames[message.direction], names, own, address, message)
 
     def from_frame(self, names: Names, message: MessagePlan) -> framing.Function | None:
         """The function that decodes a whole frame, if the frame does not identify its message."""
@@ -157,8 +162,8 @@ class FrameSection:
         """Properties of the frame for the dispatch template."""
         name, protocol = self.view.address, self.plan.protocol
         broadcast = protocol.bus.broadcast is not None
-        values = self.plan.frame.envelope.values
-        refused = list(framing.address_of(self.plan, name).refused)
+        refused = list(framing.address_of(self.plan, name, "request").refused)
+        values = self.plan.frame.envelope.values  # of the response
         summed = f"{protocol.name}_frame_sum(frame), " if self.request_sum else ""
         return DispatchView(
             is_broadcast=f"frame->{name} == {protocol.name.upper()}_BROADCAST" if broadcast else "false",
@@ -171,19 +176,41 @@ class FrameSection:
         )
 
 
+def _common(plan: Plan, ways: Mapping[str, PartsViews]) -> PartsViews:
+    """The views of what the frames of all directions have in common, such as their receiver."""
+    request, response = ways["request"], ways["response"]
+    view = replace(
+        response.f,
+        body_size=max(request.f.body_size, response.f.body_size),
+        max_wire=max(request.f.max_wire, response.f.max_wire),
+        has_values=bool(plan.beside),
+    )
+    longest = f"((receiver->direction == {plan.protocol.name.upper()}_REQUEST) ? {{}} : {{}})"
+    most = [request.parts.max_frame, response.parts.max_frame]
+    parts = replace(
+        response.parts,
+        max_frame=most[0] if most[0] == most[1] else longest.format(*most),
+        index_type=max((request.parts.index_type, response.parts.index_type), key=len),
+    )
+    return replace(response, f=view, parts=parts)
+
+
 def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
     """Choose by the way frames are received."""
     receiver, check = plan.frame.receiver, plan.frame.check
     match receiver:
         case Hunt() | Rescan():
-            views = parts_views(plan, layouts)
+            ways = parts_views(plan, layouts)
+            views = _common(plan, ways) if plan.directed else ways[""]
             frame = "frame_stuffed" if views.stuffed else "frame_plain"
             templates: tuple[str, ...] = ("place", "values", frame, "wrap", "frame_public")
             if views.ended:
                 made = ("coding", "wrap_coded") if views.ended.stages else ("frame_plain",)
                 templates = ("place", "values", *made, "scan_ended", "wrap", "frame_public")
             kind = "receiver_streamed" if isinstance(receiver, Hunt) else "receiver_rescan"
-            return FrameSection(plan, views.f, views.others, views.algorithms, templates, kind)
+            templates = (*templates[:-1], "ways", templates[-1]) if plan.directed else templates
+            each = ways if plan.directed else {}
+            return FrameSection(plan, views.f, views.others, views.algorithms, templates, kind, each)
         case Marks():
             value = [crc.render(check.algorithm)] if check else []
             marked: Mapping[str, View] = {"place": PLACE, "marked": marked_view(plan)}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from qlinkgen.backends.c.checks import condition, refused_when_received
 from qlinkgen.backends.c.names import Names, storage, unsigned, unsigned_type
 from qlinkgen.backends.c.sizes import size_terms
-from qlinkgen.model.message import Message
+from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.naming import member
 from qlinkgen.plan.ends import ByMark
 from qlinkgen.plan.expr import OneOf
@@ -108,13 +108,13 @@ def address_group(message: MessagePlan, address: Address) -> AddressGroup | None
     return AddressGroup(name, f"{address.name} {text}", condition)
 
 
-def to_frame(frame: FramePlan, names: Names, address: Address, message: MessagePlan) -> Function:
-    """The function that encodes the whole frame of a message."""
+def to_frame(frame: FramePlan, names: Names, own: str, address: Address, message: MessagePlan) -> Function:
+    """The function that encodes the whole frame of a message; ``own`` begins the names of what it calls."""
     stated = message.message
     struct = struct_parameter(names, stated, const=True)
-    lines, size = _payload_lines(names, message, bool(struct)) if stated.fields else ([], "0")
+    lines, size = _payload_lines(names, own, message, bool(struct)) if stated.fields else ([], "0")
     group = address_group(message, address)
-    wrap = f"{names.prefix}_wrap_{group.name}_" if group else f"{names.prefix}_wrap_"
+    wrap = f"{own}_wrap_{group.name}_" if group else f"{own}_wrap_"
     arguments = f"{names.constant(stated)}_ID, {address.argument}wire, capacity, {size}"
     lines.append(f"return {wrap}({arguments}{_checked(frame, message)});")
     return Function(struct + address.parameter, lines)
@@ -127,12 +127,12 @@ def _checked(frame: FramePlan, message: MessagePlan) -> str:
     return ", true" if message.checked else ", false"
 
 
-def _payload_lines(names: Names, plan: MessagePlan, has_struct: bool) -> tuple[list[str], str]:
+def _payload_lines(names: Names, own: str, plan: MessagePlan, has_struct: bool) -> tuple[list[str], str]:
     """Statements that encode the payload if it fits; otherwise wrapping fails."""
-    p, call, message = names.prefix, "message, " if has_struct else "", plan.message
+    call, message = "message, " if has_struct else "", plan.message
     constant = names.constant(message)
     if is_trimmed(plan.payload):
-        return _trimmed_lines(names, plan, call), "size"
+        return _trimmed_lines(names, own, plan, call), "size"
     size, fits = f"{constant}_MAX_SIZE", f"capacity >= {constant}_MAX_FRAME_SIZE"
     lines = []
     if message.variable:
@@ -140,24 +140,24 @@ def _payload_lines(names: Names, plan: MessagePlan, has_struct: bool) -> tuple[l
         if plan.payload.walked:
             size = f"{names.function(message)}_size_(message)"
         lines.append(f"const size_t payload_size = {size};")
-        size, fits = "payload_size", f"{p}_fits_(capacity, payload_size)"
+        size, fits = "payload_size", f"{own}_fits_(capacity, payload_size)"
     start = f"(int){size}"
     if message.variable and is_wide(plan):
         start = f"(payload_size > {constant}_MAX_SIZE) ? (int){names.upper}_ERROR_LENGTH : {start}"
-    encode = f"{names.function(message)}_encode({call}{p}_place_(wire, capacity, {size}), {size})"
+    encode = f"{names.function(message)}_encode({call}{own}_place_(wire, capacity, {size}), {size})"
     lines += [f"int size = {start};", "", f"if ({fits}) {{", f"    size = {encode};", "}"]
     return lines, "size"
 
 
-def _trimmed_lines(names: Names, plan: MessagePlan, call: str) -> list[str]:
+def _trimmed_lines(names: Names, own: str, plan: MessagePlan, call: str) -> list[str]:
     """As `_payload_lines`: the size of what is sent is known only after the whole payload is encoded."""
     p = names.prefix
     return [
         f"uint8_t payload[{names.constant(plan.message)}_MAX_SIZE];",
         f"const int size = {names.function(plan.message)}_encode({call}payload, sizeof payload);",
         "",
-        f"if ((size > 0) && {p}_fits_(capacity, (size_t)size)) {{",
-        f"    {p}_copy_({p}_place_(wire, capacity, (size_t)size), payload, (size_t)size);",
+        f"if ((size > 0) && {own}_fits_(capacity, (size_t)size)) {{",
+        f"    {p}_copy_({own}_place_(wire, capacity, (size_t)size), payload, (size_t)size);",
         "}",
     ]
 
@@ -191,9 +191,9 @@ def _both(first: str, second: str) -> str:
     return f"({first}) && {second}" if first and second else first or second
 
 
-def address_of(plan: Plan, name: str) -> Address:
-    """The address of the frames of a protocol; one that shares a byte has the type of a byte."""
-    envelope = plan.frame.envelope
+def address_of(plan: Plan, name: str, direction: Direction = "response") -> Address:
+    """The address of the frames of a direction; one that shares a byte has the type of a byte."""
+    envelope = plan.frames[direction].envelope
     refused = [
         test
         for _, each in envelope.values

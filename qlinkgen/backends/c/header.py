@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import get_args
 
 import jinja2
 
@@ -15,7 +16,7 @@ from qlinkgen.backends.c.crc import CrcView
 from qlinkgen.backends.c.describe import WIDTH
 from qlinkgen.backends.c.example import example_lines, option_lines
 from qlinkgen.backends.c.forms import Helper
-from qlinkgen.backends.c.frames import FrameSection, frame_section
+from qlinkgen.backends.c.frames import FrameSection, View, frame_section
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.messages import Beside, MessageWriter, Rounding, nearest_helpers
 from qlinkgen.backends.c.names import Names
@@ -23,13 +24,17 @@ from qlinkgen.backends.c.places import in_hex
 from qlinkgen.backends.c.sizes import SizeView, size_view
 from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.backends.c.types import Kind, Types
+from qlinkgen.backends.c.views import FrameView, own_prefix
 from qlinkgen.model.fields import Layout
-from qlinkgen.model.message import Message
+from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.naming import snake
 from qlinkgen.model.types import Float
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.payload import BytesStep, all_records
 from qlinkgen.plan.tree import MessagePlan, Plan
+
+#: Templates about what the frames of all directions have in common.
+_COMMON = ("coding", "ways", "frame_public")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +102,9 @@ class Header:
         self._writer = MessageWriter(self._names, self._layouts, self._types)
         self._kept = tuple(each.message for each in plan.messages)
         self._section = frame_section(plan, self._layouts)
-        self._address = framing.address_of(plan, self._section.view.address)
+        directions: tuple[Direction, ...] = get_args(Direction)
+        name = self._section.view.address
+        self._addresses = {each: framing.address_of(plan, name, each) for each in directions}
         self._wide = any(map(framing.is_wide, plan.messages))
 
     def text(self) -> str:
@@ -107,7 +114,7 @@ class Header:
             self._check_value(),
             self._place("frame_common", f=self._section.view, beside=self._beside()),
             *self._directions(),
-            *[self._frame_part(name) for name in self._section.templates],
+            *[text for name in self._section.templates for text in self._frame_parts(name)],
             *[self._record(layout) for layout in plan.layouts],
             *[self._message(message) for message in self._plan.messages],
             *self._checks(),
@@ -120,33 +127,45 @@ class Header:
 
     def _place(self, template: str, **views: object) -> str:
         return self._templates.get_template(f"templates/{template}.h.j2").render(
-            p=self._names.prefix, P=self._names.upper, **views
+            p=self._names.prefix, P=self._names.upper, **{"q": self._names.prefix, **views}
         )
 
-    def _frame_part(self, template: str) -> str:
+    def _frame_parts(self, template: str) -> Iterator[str]:
+        """The text of a template, for each direction if it is about what differs between their frames."""
+        section = self._section
+        if template in _COMMON or not section.ways:
+            yield self._frame_part(template, section.view, section.views)
+            return
+        for way, views in section.ways.items():
+            yield self._frame_part(template, views.f, views.others, way)
+
+    def _frame_part(self, template: str, view: FrameView, views: Mapping[str, View], way: str = "") -> str:
         section = self._section
         return self._place(
             template,
-            f=section.view,
+            q=own_prefix(self._names.prefix, way),
+            f=view,
+            ways={each: found.f for each, found in section.ways.items()},
             crc=section.check,
             unused=self._unused_arguments(),
             wide=self._wide,
-            address_groups=self._address_groups(),
+            address_groups=self._address_groups(way),
             shapes=section.shapes(self._names),
             sizes=section.sizes(self._names),
             judgement=section.judgement,
-            **section.views,
+            **views,
         )
 
     def _beside(self) -> Beside | None:
         """The struct of the values of every frame, None without any."""
-        held = {member.name: member for _, member in self._plan.frame.envelope.values}
+        held = self._plan.beside
         stated = self._protocol.frame_values
         return self._writer.beside([(held[each.name], each) for each in stated]) if held else None
 
-    def _address_groups(self) -> list[framing.AddressGroup]:
-        """Sets of legal addresses of the encoded messages."""
-        groups = (framing.address_group(m, self._address) for m in self._plan.messages if m.encoded)
+    def _address_groups(self, way: str) -> list[framing.AddressGroup]:
+        """Sets of legal addresses of the encoded messages of a direction, or of all."""
+        sent = [each for each in self._plan.messages if each.encoded and way in ("", each.direction)]
+        groups = (framing.address_group(each, self._addresses[each.direction]) for each in sent)
         return list(dict.fromkeys(group for group in groups if group))
 
     def _check_value(self) -> str:
@@ -185,7 +204,9 @@ class Header:
         return texts
 
     def _expected(self, messages: Sequence[MessagePlan]) -> list[framing.Expected]:
-        return [framing.expected(self._names, self._address, message) for message in messages]
+        return [
+            framing.expected(self._names, self._addresses[message.direction], message) for message in messages
+        ]
 
     def _unused_arguments(self) -> list[str]:
         """Parameters that are unused if no message is received."""
@@ -204,7 +225,9 @@ class Header:
             "message",
             m=self._writer.render(message),
             early_id=section.needs_ids,
-            to_frame=section.to_frame(names, self._address, message) if message.encoded else None,
+            to_frame=section.to_frame(names, self._addresses[message.direction], message)
+            if message.encoded
+            else None,
             from_frame=section.from_frame(names, message) if message.decoded else None,
         )
 
@@ -218,7 +241,8 @@ class Header:
         """The receiver; that of packets only for slaves."""
         if self._plan.role == "master" and self._section.slave_only:
             return []
-        return [self._frame_part(self._section.receiver)]
+        section = self._section
+        return [self._frame_part(section.receiver, section.view, section.views)]
 
     def _dispatch(self) -> str:
         section, commands, role = self._section, self._plan.commands, self._plan.role
@@ -234,7 +258,9 @@ class Header:
             slave=slave,
             replies=self._replies(slave),
             slave_groups=dispatch.slave_groups(slave, self._names.prefix),
-            master=dispatch.callbacks(self._names, self._address, self._plan.messages) if listens else [],
+            master=dispatch.callbacks(self._names, self._addresses["response"], self._plan.messages)
+            if listens
+            else [],
             asked=dispatch.asked(self._names, self._plan),
             carrier=dispatch.carrier(self._names, self._plan),
             transactions=dispatch.transactions(self._protocol, self._names.upper, commands),

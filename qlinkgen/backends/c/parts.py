@@ -11,6 +11,7 @@ from qlinkgen.backends.c.checks import as_unsigned, from_unsigned, refused_befor
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.backends.c.places import any_of, in_hex, refusal, shifted
 from qlinkgen.model.naming import member
+from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import (
     AddressPart,
     AddressSlot,
@@ -109,8 +110,11 @@ class PartWriter(CheckWriter):
         ]
 
     def get_values(self) -> list[str]:
-        """Statements that read the values of a received frame."""
+        """Statements that read the values of a received frame; those that it does not have get defaults."""
         lines = []
+        if {name for each in self.every for name in _names(each)} != _names(self.envelope):
+            lines += ["{", f"    const {self.prefix}_parts_t initial = {self.prefix.upper()}_PARTS_INIT;"]
+            lines += ["    frame->parts = initial;", "}"]
         for part, each in self.envelope.values:
             kind = unsigned_type(each.bits)
             found = self._taken(self.get(part), each, whole=each.bits == part.integer.bits)
@@ -253,6 +257,11 @@ class PartWriter(CheckWriter):
                 yield f"{self.get(part)} != {derived(part, self.get(part.of))}"
             case _:
                 pass
+
+
+def _names(envelope: Envelope) -> set[str]:
+    """The values of a frame."""
+    return {each.name for _, each in envelope.values}
 
 
 def derived(part: EqualPart, other: str) -> str:

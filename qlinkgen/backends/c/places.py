@@ -71,6 +71,11 @@ class Places:
     seeds: tuple[tuple[str, bytes], ...] = ()
     #: A receiver knows the direction.
     directed: bool = False
+    #: What the names of functions begin with that are about these frames: the prefix, with the direction if
+    #: the other direction has other frames.
+    own: str = ""
+    #: The frames of all directions.
+    every: tuple[Envelope, ...] = ()
 
     @property
     def envelope(self) -> Envelope:

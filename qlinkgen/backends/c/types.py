@@ -98,7 +98,7 @@ class Types:
         Fields may narrow a type; the most frequent variant becomes the C type.
         """
         found: dict[str, Counter[Scalar]] = {}
-        beside = (member.number for _, member in self._plan.frame.envelope.values)
+        beside = (member.number for member in self._plan.beside.values())
         for number in (*beside, *self.numbers()):
             if (
                 number.type_name

@@ -17,6 +17,7 @@ from qlinkgen.backends.c.parts import PartWriter, length_bounds
 from qlinkgen.backends.c.places import in_hex, sender_of
 from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.ends import ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import Plan
 
@@ -47,6 +48,7 @@ class FrameView:
     init_direction: str
     pass_direction: str
     pass_decode_direction: str
+    direction_unused: bool
     check_name: str
     bare: bool
     checks_header: bool
@@ -57,15 +59,23 @@ class FrameView:
     idle: tuple[int, int] | None
 
 
+def own_prefix(prefix: str, way: str) -> str:
+    """What the names of functions begin with that are about the frames of a direction alone."""
+    return f"{prefix}_{way}" if way else prefix
+
+
 def frame_view(
-    plan: Plan, *, body_size: int = 0, check_optional: bool = False, max_wire: int = 0
+    plan: Plan,
+    frame: FramePlan | None = None,
+    *,
+    body_size: int = 0,
+    check_optional: bool = False,
+    max_wire: int = 0,
 ) -> FrameView:
-    """What every frame has."""
-    prefix, sender, receiver = (
-        plan.protocol.name,
-        sender_of(plan.frame, plan.protocol.name),
-        plan.frame.receiver,
-    )
+    """What every frame has; ``frame`` is that of a direction."""
+    frame = frame or plan.frame
+    prefix, receiver = plan.protocol.name, frame.receiver
+    sender = sender_of(frame, prefix)
     ring, directed = plan.protocol.directions == ("message",), _directed(plan)
     answered = "request_check" if isinstance(receiver, InStep) else "request_check or _response_check"
     return FrameView(
@@ -82,10 +92,11 @@ def frame_view(
         init_direction=f", {prefix}_direction_t direction" if directed else "",
         pass_direction="receiver->direction, " if directed else "",
         pass_decode_direction="direction, " if directed else "",
+        direction_unused=directed and not _uses_direction(frame),
         check_name="message_check" if ring else answered,
         bare=isinstance(receiver, Rescan) and receiver.bare,
-        checks_header=plan.frame.checks_header,
-        sized_by_message=isinstance(receiver, Hunt | Rescan) and isinstance(plan.frame.end, ByMessage),
+        checks_header=frame.checks_header,
+        sized_by_message=isinstance(receiver, Hunt | Rescan) and isinstance(frame.end, ByMessage),
         body_size=body_size,
         check_optional=check_optional,
         max_wire=max_wire,
@@ -109,13 +120,18 @@ def _directed(plan: Plan) -> bool:
         case Hunt() | InStep():
             return False
         case Rescan():
-            by_message = isinstance(plan.frame.end, ByMessage)
-            needed = plan.frame.checks_header or not receiver.verified or by_message or receiver.seeded
+            needed = plan.directed or not receiver.verified or _uses_direction(plan.frame)
         case Marks():
             needed = True
         case _:
             assert_never(receiver)
     return needed and plan.protocol.directions != ("message",)
+
+
+def _uses_direction(frame: FramePlan) -> bool:
+    """Whether a function that finds a frame in bytes depends on its direction."""
+    by_message, receiver = isinstance(frame.end, ByMessage), frame.receiver
+    return frame.checks_header or by_message or (isinstance(receiver, Rescan) and receiver.seeded)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,7 +166,7 @@ class PartsView:
     tail: int
     header: int
     overhead: int
-    max_frame: int
+    max_frame: str
     index_type: str
     id_value: str
     address_value: str
@@ -282,11 +298,18 @@ class PartsViews:
         }
 
 
-def parts_views(plan: Plan, layouts: Layouts) -> PartsViews:
-    """The views of a delimited frame."""
+def parts_views(whole: Plan, layouts: Layouts) -> dict[str, PartsViews]:
+    """The views of a delimited frame for each direction; "" if both have the same."""
+    return {way: _parts_views(whole, plan, way, layouts) for way, plan in whole.ways.items()}
+
+
+def _parts_views(whole: Plan, plan: Plan, way: str, layouts: Layouts) -> PartsViews:
     seeds = plan.messages[0].message.seeds if plan.messages else ()
     sender = sender_of(plan.frame, plan.protocol.name)
-    writer = PartWriter(plan.protocol.name, plan.frame, sender, layouts, seeds, directed=_directed(plan))
+    prefix, directed = plan.protocol.name, _directed(whole)
+    every = (whole.frame.envelope, *([whole.frames["request"].envelope] if way else []))
+    own = own_prefix(prefix, way)
+    writer = PartWriter(prefix, plan.frame, sender, layouts, seeds, directed, own, every)
     envelope, receiver, transparency = plan.frame.envelope, plan.frame.receiver, plan.frame.transparency
     rule, body_size = None, 0
     match transparency:
@@ -303,8 +326,9 @@ def parts_views(plan: Plan, layouts: Layouts) -> PartsViews:
             raise AssertionError("a marked frame has no parts that a length or its message ends")
         case _:
             assert_never(transparency)
-    stuffing, frame = writer.stuffing, frame_view(plan, body_size=body_size, max_wire=plan.frame.max_wire)
-    directed = frame.pass_decode_direction
+    stuffing = writer.stuffing
+    frame = frame_view(whole, plan.frame, body_size=body_size, max_wire=plan.frame.max_wire)
+    passed = frame.pass_decode_direction
     return PartsViews(
         algorithms=list(writer.algorithms.values()),
         f=frame,
@@ -315,11 +339,11 @@ def parts_views(plan: Plan, layouts: Layouts) -> PartsViews:
             overhead=envelope.overhead,
         ),
         parts=_parts(writer, plan.frame.max_wire),
-        plain=None if stuffing else _plain(writer, directed),
-        stuffed=_stuffed(writer, stuffing, directed) if stuffing else None,
+        plain=None if stuffing else _plain(writer, passed),
+        stuffed=_stuffed(writer, stuffing, passed) if stuffing else None,
         inserted=_inserted(rule) if rule else None,
         hunt=_hunted(writer, receiver) if isinstance(receiver, Hunt) else None,
-        ended=_ended(writer, plan.frame.end, directed) if isinstance(plan.frame.end, ByTerminator) else None,
+        ended=_ended(writer, plan.frame.end, passed) if isinstance(plan.frame.end, ByTerminator) else None,
     )
 
 
@@ -332,7 +356,7 @@ def _parts(writer: PartWriter, max_wire: int) -> PartsView:
         tail=envelope.trailer_size,
         header=envelope.header_size,
         overhead=envelope.overhead,
-        max_frame=writer.frame.longest,
+        max_frame=f"{writer.frame.longest}U",
         index_type=unsigned_type(max(16, max_wire.bit_length())),
         id_value=writer.number(envelope.id),
         address_value=writer.number(envelope.address),

@@ -126,7 +126,7 @@ class Kit:
             P=header.upper,
             id=header.id,
             address=header.address,
-            has_values=bool(self._plan.frame.envelope.values),
+            has_values=bool(self._plan.beside),
             store=self._entries.store,
             directed=header.directed,
             unpacks=header.unpacks,

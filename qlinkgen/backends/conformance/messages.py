@@ -131,7 +131,7 @@ class Entries:
     @property
     def store(self) -> str:
         """The place of the messages."""
-        return "store.message." if self._plan.frame.envelope.values else "store."
+        return "store.message." if self._plan.beside else "store."
 
     def views(self) -> list[Entry]:
         """The views of all messages."""
@@ -168,7 +168,7 @@ class Entries:
         function, stem = header.function(message), naming.member(header.stem(message))
         store = f"&{self.store}{stem}, " if message.values else ""
         address = "address, " if header.address else ""
-        address += "&store.parts, " if self._plan.frame.envelope.values else ""
+        address += "&store.parts, " if plan.envelope.values else ""
         part = "request_sum, " if header.sum_bits and plan.direction == "response" else ""
         decode = f"decode({store}" if framed else f"from_frame({store}{part}"
         handled, called = self._has_handler(plan), self._has_callback(plan)
@@ -263,7 +263,7 @@ class Entries:
     def _lines(self, row: Row, found: Stream | None, index: int) -> list[str]:
         """A row of the table, with a comment if its first byte does not describe it."""
         pieces = [self._head(row)]
-        if isinstance(row, Right) and (row.message.values or self._plan.frame.envelope.values):
+        if isinstance(row, Right) and (row.message.values or row.beside):
             pieces.append(self._sized(row.values))
         if self._header.sum_bits and row.message.direction == "response":
             pieces.append(self._sized(row.request))

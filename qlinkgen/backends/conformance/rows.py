@@ -101,7 +101,7 @@ def _right(plan: Plan, header: Header, entry: JsonObject) -> Right:
     planned = plan.by_name[entry["message"]]
     message = planned.message
     kinds = tuple(kind for kind in entry.get("kinds", ()) if kind != "example")
-    beside = _beside(plan, entry)
+    beside = _beside(plan, message, entry)
     return Right(
         message=message,
         kinds=kinds,
@@ -151,10 +151,10 @@ def presences(held: Sequence[Holder]) -> dict[str, Presence]:
     return found
 
 
-def _beside(plan: Plan, entry: JsonObject) -> dict[str, int]:
+def _beside(plan: Plan, message: Message, entry: JsonObject) -> dict[str, int]:
     """The values of the frame by name, raw."""
     found: dict[str, int] = {}
-    for value in plan.protocol.frame_values:
+    for value in plan.protocol.beside(message):
         key = record_key(value.name)
         native = from_json(value, entry[key]) if key in entry else default_of(value)
         found[value.name] = raw_number(value.name, plan.beside[value.name].number, native)

@@ -34,9 +34,21 @@ from qlinkgen.plan.payload import Member, PayloadPlan
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
+#: The name of the definition of each algorithm.
+Algorithms = Mapping[catalogue.Checksum, str]
 #: Names of definitions other than messages and types.
 _OWN_NAMES = (
-    *("ALGORITHM", "LAYOUT", "MESSAGES", "REQUEST_FRAME", "RESPONSE_FRAME", "FRAME", "CRC"),
+    *(
+        "ALGORITHM",
+        "LAYOUT",
+        "REQUEST_LAYOUT",
+        "RESPONSE_LAYOUT",
+        "MESSAGES",
+        "REQUEST_FRAME",
+        "RESPONSE_FRAME",
+        "FRAME",
+        "CRC",
+    ),
     *(f"ALGORITHM_{number}" for number in range(2, 10)),
 )
 
@@ -100,15 +112,20 @@ def _presence(payload: PayloadPlan) -> Iterator[Node]:
 
 def _frames(plan: Plan, messages: Mapping[str, str], types: Types) -> Iterator[Definition]:
     frame = plan.frame
-    for algorithm, name in _algorithms(frame.envelope).items():
+    algorithms = _algorithms(plan)
+    for algorithm, name in algorithms.items():
         yield Definition(name, _algorithm(algorithm), algorithm.name)
     stated = plan.protocol.frame
-    if not frame.needs_request:
-        yield Definition("LAYOUT", _layout(frame.envelope, types), comment(stated.doc, stated.section))
+    said = comment(stated.doc, stated.section)
+    for way, each in plan.ways.items() if not frame.needs_request else ():
+        yield Definition(_layout_name(way), _layout(each.frame.envelope, types, algorithms), said)
     frames = []
     for direction in plan.protocol.directions:
         name = "FRAME" if direction == "message" else f"{direction.upper()}_FRAME"
-        layout = _layout(plan.frames[direction].envelope, types) if frame.needs_request else Ref("LAYOUT")
+        frame = plan.frames[direction]
+        layout: Node = Ref(_layout_name(direction if plan.directed else ""))
+        if frame.needs_request:
+            layout = _layout(frame.envelope, types, algorithms)
         chosen = Sequence(tuple(Ref(messages[each.name]) for each in plan.received(direction)))
         frames.append(Ref(name))
         made = _frame(frame, layout, chosen)
@@ -124,12 +141,15 @@ def _asked(plan: Plan, messages: Mapping[str, str]) -> Iterator[Node]:
         yield Call("Asked", (request, *(Ref(messages[each.name]) for each in answers)))
 
 
-def _algorithms(envelope: Envelope) -> Mapping[catalogue.Checksum, str]:
-    """The name of each algorithm of a frame, the main one first."""
-    parts = sorted(envelope.checks, key=lambda part: part is not envelope.check)
-    found = dict.fromkeys(part.check.algorithm for part in parts)
-    if envelope.blocks:
-        found[envelope.blocks.check.algorithm] = None
+def _layout_name(direction: str) -> str:
+    return f"{direction.upper()}_LAYOUT" if direction else "LAYOUT"
+
+
+def _algorithms(plan: Plan) -> Algorithms:
+    """The name of each algorithm of frames, the main one first."""
+    found = dict[catalogue.Checksum, None]()
+    for envelope in dict.fromkeys((plan.frame.envelope, plan.frames["request"].envelope)):
+        found |= dict.fromkeys(each.algorithm for each in envelope.algorithms)
     return {
         each: "ALGORITHM" if number == 1 else f"ALGORITHM_{number}" for number, each in enumerate(found, 1)
     }
@@ -167,11 +187,11 @@ def _crc(algorithm: catalogue.Algorithm) -> Call:
     )
 
 
-def _layout(envelope: Envelope, types: Types) -> Sequence:
-    return Sequence(tuple(_part(part, envelope, types) for part in envelope.parts))
+def _layout(envelope: Envelope, types: Types, algorithms: Algorithms) -> Sequence:
+    return Sequence(tuple(_part(part, envelope, types, algorithms) for part in envelope.parts))
 
 
-def _part(part: Part, envelope: Envelope, types: Types) -> Call:  # noqa: C901  # a case a part
+def _part(part: Part, envelope: Envelope, types: Types, algorithms: Algorithms) -> Call:  # noqa: C901  # a case a part
     match part:
         case ConstantPart():
             return Call("Constant", (part.name, part.data))
@@ -199,11 +219,11 @@ def _part(part: Part, envelope: Envelope, types: Types) -> Call:  # noqa: C901  
         case PayloadPart():
             return Call("Payload", (part.name, part.most))
         case CheckPart():
-            return _check(part, envelope)
+            return _check(part, envelope, algorithms)
         case BlocksPart():
             kind = Integer(8 * part.check.size, signed=False, chunks=part.check.value.chunks)
             mask = hexadecimal(part.check.mask, (part.check.algorithm.width + 3) // 4)
-            algorithm = Ref(_algorithms(envelope)[part.check.algorithm])
+            algorithm = Ref(algorithms[part.check.algorithm])
             return Call("Blocks", (part.name, algorithm, integer(kind), mask, part.every))
         case _:
             assert_never(part)
@@ -227,7 +247,7 @@ def _mark(part: MarkPart) -> Call:
     return Call("Mark", (part.name,), (("marker", hexadecimal(part.marker)), *bits, *end))
 
 
-def _check(part: CheckPart, envelope: Envelope) -> Call:
+def _check(part: CheckPart, envelope: Envelope, algorithms: Algorithms) -> Call:
     check = part.check
     kind = Integer(8 * check.size, signed=False, chunks=check.value.chunks)
     over = Sequence((envelope.payload.name,) if check.chained else check.over)
@@ -237,7 +257,7 @@ def _check(part: CheckPart, envelope: Envelope) -> Call:
     mask = hexadecimal(check.mask, (check.algorithm.width + 3) // 4)
     return Call(
         "Check",
-        (part.name, Ref(_algorithms(envelope)[check.algorithm]), integer(kind), mask, over),
+        (part.name, Ref(algorithms[check.algorithm]), integer(kind), mask, over),
         (*word, *rejected, *otherwise),
     )
 

@@ -138,7 +138,7 @@ class Types:
         return Definition(self._names[group.name], node, comment(group.doc, group.section))
 
     def _numbers(self) -> Iterator[tuple[Scalar, Node]]:
-        yield from ((member.number, _bits(member)) for _, member in self._plan.frame.envelope.values)
+        yield from ((member.number, _bits(member)) for member in self._plan.beside.values())
         payloads = [message.payload for message in self._plan.messages]
         payloads += [record.payload for record in all_records(payloads)]
         for step in (step for payload in payloads for step in payload.steps):

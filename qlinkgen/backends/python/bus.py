@@ -15,9 +15,9 @@ from qlinkgen.backends.base import Options, Outputs, banner
 from qlinkgen.backends.python import docstrings, package, values
 from qlinkgen.backends.python.fitted import fitted
 from qlinkgen.backends.python.layout import WIDTH, wrapped
-from qlinkgen.backends.python.module import templates
 from qlinkgen.backends.python.names import attribute, class_name, imported
 from qlinkgen.backends.python.place import Place, place_of
+from qlinkgen.backends.python.sections import templates
 from qlinkgen.model.naming import file_stem, method
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line

@@ -15,6 +15,7 @@ from qlinkgen.backends.python.layout import WIDTH, calls, in_hex, indented, list
 from qlinkgen.backends.python.measure import measure_lines
 from qlinkgen.backends.python.names import attribute, class_name, constant_name, natural
 from qlinkgen.backends.python.place import Place
+from qlinkgen.backends.python.sections import way_class
 from qlinkgen.backends.python.walked import WalkedDecoder, WalkedEncoder
 from qlinkgen.model.fields import Layout, Value
 from qlinkgen.model.frame import ATTRIBUTE
@@ -64,6 +65,8 @@ class ClassModel:
     has_codec: bool = False
     #: Encoding can fail because a field is absent or present.
     walked: bool = False
+    #: The direction of its frames, "" if both have the same.
+    way: str = ""
 
     @property
     def refusable(self) -> bool:
@@ -102,6 +105,10 @@ class ClassBuilder:
         shapes = [self._shape(name, message) for name, message in self._shapes.values()]
         return [*records, *shapes, *map(self._message, self._plan.messages)]
 
+    def _within(self, message: MessagePlan) -> Place:
+        """The place of a message: the frames of its direction, or no frame for a record."""
+        return self._place.within(self._plan.frames[message.direction].envelope)
+
     @property
     def scales(self) -> list[str]:
         """Definitions of the conversions of scaled values; complete once the classes are built."""
@@ -126,11 +133,11 @@ class ClassBuilder:
             message.allowed,
             message.message.default_address,
             message.checked,
-            message.direction if self._packets else "",
+            message.direction if self._divided else "",
         )
 
     @property
-    def _packets(self) -> bool:
+    def _divided(self) -> bool:
         """Whether requests and responses have different frames, and their classes different bases."""
         frames = self._plan.frames
         return frames["request"] is not frames["response"]
@@ -144,7 +151,7 @@ class ClassBuilder:
         for shape, group in groups.items():
             if len(group) < SHARED:
                 continue
-            name = _shape_name(shape.payload) + (self._base(group[0]) if self._packets else "")
+            name = _shape_name(shape.payload) + (self._base(group[0]) if self._divided else "")
             names[name] = names.get(name, 0) + 1
             found[shape] = (f"{name}{names[name]}" if names[name] > 1 else name, group[0])
         return found
@@ -173,11 +180,12 @@ class ClassBuilder:
         scales = self._scales_of(message)
         walked = message.payload.walked
         make_encoder, make_decoder = (WalkedEncoder, WalkedDecoder) if walked else (Encoder, Decoder)
-        encoder = make_encoder(message, self._place, title, number, scales)
-        decoder = make_decoder(message, self._place, title, scales)
-        name = "" if self._place.envelope is None else "body"
+        place = self._within(message)
+        encoder = make_encoder(message, place, title, number, scales)
+        decoder = make_decoder(message, place, title, scales)
+        name = "" if place.envelope is None else "body"
         encode = encoder.statements(name)
-        held = (*self._place.beside, *message.payload.settable)
+        held = (*place.beside, *message.payload.settable)
         names = sorted((attribute(each.name) for each in held), key=natural)
         return replace(
             head,
@@ -191,6 +199,7 @@ class ClassBuilder:
             body_size=self._body_size(message),
             has_codec=True,
             walked=any("misplaced(" in line for line in encode),
+            way=message.direction if self._plan.directed and place.envelope else "",
         )
 
     @property
@@ -207,13 +216,16 @@ class ClassBuilder:
 
     def _body_size(self, message: MessagePlan) -> int | None:
         """Number of bytes that the encoder packs, None if it varies."""
-        if self._place.envelope is None or not message.payload.fixed:
+        place = self._within(message)
+        if place.envelope is None or not message.payload.fixed:
             return None
-        parts = (*self._place.front, *self._place.back)
+        parts = (*place.front, *place.back)
         return message.payload.most + sum(part.size for part in parts)
 
     def _base(self, message: MessagePlan) -> str:
-        return message.direction.title() if self._packets and message.direction != "message" else "Message"
+        if not self._divided or message.direction == "message":
+            return "Message"
+        return way_class(message.direction) if self._plan.directed else message.direction.title()
 
     def _checked(self, message: MessagePlan) -> list[str]:
         """The constant for a message with a check value, if only some have one."""
@@ -225,7 +237,7 @@ class ClassBuilder:
     def _scales_of(self, message: MessagePlan) -> dict[str, str]:
         """The constant that converts each scaled value, named after its type or else its field."""
         found = {}
-        for each in (*self._place.beside, *message.payload.settable):
+        for each in (*self._within(message).beside, *message.payload.settable):
             if isinstance(each, ValueStep | Member | ItemsStep) and each.number.scaling is not None:
                 found[each.name] = self._scale(each.name, each.number)
         return found
@@ -248,11 +260,12 @@ class ClassBuilder:
             facts.append(f"DEFAULT_ADDRESS = {address}")
         names = [f'"{attribute(each.name)}"' for each in payload.settable]
         facts += listing("FIELDS = (", names, ")", 4) if names else []
-        rules = values.rules(message, self._place, scales)
+        rules = values.rules(message, self._within(message), scales)
         return [*facts, *calls("RULES = (", rules, ")", 4)] if rules else facts
 
     def _init(self, message: MessagePlan) -> list[str]:
-        place, address = self._place, self._place.address if message.allowed is not None else ""
+        place = self._within(message)
+        address = place.address if message.allowed is not None else ""
         # The address has a default only if there is just one.
         spans = {end for span in message.message.addresses for end in span}
         default = f" = {message.message.default_address}" if len(spans) == 1 else ""

@@ -10,6 +10,7 @@ from qlinkgen.backends.python import integers, pieces
 from qlinkgen.backends.python.coding import CodingView, coding_view
 from qlinkgen.backends.python.layout import in_hex, literal, slice_of, wrapped
 from qlinkgen.backends.python.names import attribute, class_name
+from qlinkgen.backends.python.ways import Ways
 from qlinkgen.model.checksum import Algorithm, Checksum, Fletcher, Sum, Xor, catalogue
 from qlinkgen.model.frame import Silence
 from qlinkgen.model.integer import ByteOrder
@@ -51,6 +52,9 @@ class DecodedDirection:
     asking: str
     by_id: str
     readers_by_id: str
+    #: The function that decodes one frame, and what the decoder of a stream uses.
+    decode: str = "_decode"
+    ways: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -349,12 +353,12 @@ def view_of(plan: Plan, title: str, sizes: Sequence[int]) -> FrameView:
 # Directions
 
 
-def decoded_directions(plan: Plan) -> list[DecodedDirection]:
+def decoded_directions(plan: Plan, ways: Ways) -> list[DecodedDirection]:
     """Functions and tables for each decoded direction."""
-    return [_decoded_direction(plan, direction) for direction in plan.received_directions]
+    return [_decoded_direction(plan, direction, ways) for direction in plan.received_directions]
 
 
-def _decoded_direction(plan: Plan, direction: Direction) -> DecodedDirection:
+def _decoded_direction(plan: Plan, direction: Direction, ways: Ways) -> DecodedDirection:
     messages = plan.received(direction)
     whole = direction == "message"
     upper = "" if whole else f"_{direction.upper()}"
@@ -367,6 +371,8 @@ def _decoded_direction(plan: Plan, direction: Direction) -> DecodedDirection:
         asking=", request: Message | None = None" if direction == "response" and plan.asked else "",
         by_id=_by_id(messages),
         readers_by_id=_by_id(messages, ".from_checked"),
+        decode=ways.of("_decode", direction),
+        ways=[ways.of(name, direction) for name in ("_split", "_judge", "_MAX_FRAME")],
     )
 
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import jinja2
-
 from qlinkgen.backends import python_text
-from qlinkgen.backends.base import banner, environment
+from qlinkgen.backends.base import banner
 from qlinkgen.backends.python import frames, tables
 from qlinkgen.backends.python.classes import ClassBuilder, ClassModel
 from qlinkgen.backends.python.fitted import fitted
@@ -19,6 +16,8 @@ from qlinkgen.backends.python.frames import FrameView, MarkedView, PacketView, P
 from qlinkgen.backends.python.layout import WIDTH
 from qlinkgen.backends.python.names import by_kind, class_name, imported
 from qlinkgen.backends.python.place import Place, place_of
+from qlinkgen.backends.python.sections import Sections, templates
+from qlinkgen.backends.python.ways import Ways
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.types import Enum, Flags
 from qlinkgen.plan.coding import Digits
@@ -43,14 +42,6 @@ _ELSEWHERE = {"Decimal", "index", *_STRUCT, *(name for names in _SHARED.values()
 def render(plan: Plan) -> str:
     """The text of a protocol's module."""
     return Module(plan).text()
-
-
-@functools.cache
-def templates() -> jinja2.Environment:
-    """The templates of this back-end, with a filter that quotes text."""
-    found = environment(__package__)
-    found.filters["docstring"] = lambda text: "\n".join(python_text.docstring([text]))
-    return found
 
 
 @dataclass(frozen=True)
@@ -97,6 +88,8 @@ class ModuleView:
     classes: str
     public: Sequence[str]
     imports: Imports
+    directed: bool
+    frames_with: Mapping[str, str]
 
 
 class Module:
@@ -112,8 +105,10 @@ class Module:
         """The module's text."""
         plan, models = self.plan, self.builder.build()
         sizes = sorted({each.body_size for each in models if each.body_size is not None})
-        view = frames.view_of(plan, one_line(plan.protocol.title), sizes)
-        decoded_directions = frames.decoded_directions(plan)
+        title = one_line(plan.protocol.title)
+        views = {way: frames.view_of(each, title, sizes) for way, each in plan.ways.items()}
+        view, sections = views[list(views)[-1]], Sections(views, plan.received_directions, bool(plan.beside))
+        decoded_directions = frames.decoded_directions(plan, sections.ways)
         quoted = [f'"{each.direction}"' for each in decoded_directions]
         module = ModuleView(
             f=view,
@@ -131,13 +126,14 @@ class Module:
             commands=tables.command_rows(plan),
             records=[MessageRow(each.name, self.place.classes[each.name]) for each in plan.layouts],
             scales=self.builder.scales,
-            classes=self._classes(models, view),
+            classes=self._classes(models, view, sections.ways),
             public=self._public(view, decoded_directions),
-            imports=self._imports(view, models),
+            imports=self._imports(list(views.values()), models),
+            directed=plan.directed,
+            frames_with={way: sections.ways.of("_frame_with", way) for way in views},
         )
-        frame = _placed(f"{view.template}.j2", module).strip()
-        decoder = _placed(f"{view.template}_decoder.j2", module).strip()
-        return _tidy(_placed("module.j2", module, frame=frame, decoder=decoder))
+        decoder = _placed(f"{view.template}_decoder.j2", module, search=sections.search).strip()
+        return _tidy(_placed("module.j2", module, frame=sections.frame, decoder=decoder))
 
     def _doc(self) -> list[str]:
         protocol = self.plan.protocol
@@ -147,7 +143,7 @@ class Module:
         banner_lines = [line for other in others for line in textwrap.wrap(other, WIDTH)]
         return python_text.docstring([*opening, "", *textwrap.wrap(about, WIDTH), "", *banner_lines])
 
-    def _classes(self, models: Sequence[ClassModel], view: FrameView) -> str:
+    def _classes(self, models: Sequence[ClassModel], view: FrameView, ways: Ways) -> str:
         template = templates().get_template("templates/class.j2")
         framed = self.place.envelope is not None
         texts = []
@@ -161,7 +157,7 @@ class Module:
                 encoder_doc=f"The {'bytes of the ' * (kind == 'record')}{kind}. Raises EncodeError.",
                 data=self.place.data if whole else "payload",
             )
-            texts.append(text)
+            texts.append(ways.of(text, each.way))
         return "".join(texts).strip("\n")
 
     @staticmethod
@@ -176,7 +172,7 @@ class Module:
 
     # Names
 
-    def _imports(self, view: FrameView, models: Sequence[ClassModel]) -> Imports:
+    def _imports(self, views: Sequence[FrameView], models: Sequence[ClassModel]) -> Imports:
         """Imports used by the classes and by the templates of the frame."""
         plan, used = self.plan, {*self.place.used, *_PUBLIC, "BaseMessage", "as_bytes", "wrong_size"}
         used |= {"OpenEnum", "named"} if plan.enums else set()
@@ -188,23 +184,25 @@ class Module:
         used |= {"Misplaced"} if any(each.walked for each in models) else set()
         typing = {"ClassVar", "Literal", "Self"}
         typing |= {"Final"} if plan.flags else set()
+        view = views[-1]
         check = None if isinstance(view, PacketView) else view.check
         if check is not None:
             used |= {"Checksum", "wrong_check", check.maker}
             used |= {"find_crc"} if check.selectable else set()
+        used |= {check.view.maker for each in views if isinstance(each, PartsView) for check in each.checks}
         match view:
             case UniqueView():
                 used |= {"UNREAD", "UNREADABLE", *(["Struct"] if view.whole_sizes else [])}
                 typing |= {"Any"}
             case PartsView():
-                used |= {each.view.maker for each in view.checks}
                 used |= {"wrong_check", view.blocks.view.maker} if view.blocks else set()
             case MarkedView():
                 used |= {"Marking", "illegal", "index", "refused"}
             case PacketView():
                 used |= {"short_of"}
         seeds = isinstance(view, PartsView) and view.seeds
-        if isinstance(view, UniqueView | PartsView) and not view.address and not seeds:
+        held = self.plan.directed and bool(self.plan.beside)
+        if isinstance(view, UniqueView | PartsView) and not view.address and not seeds and not held:
             typing -= set() if plan.enums else {"ClassVar"}
         if isinstance(view, PacketView) and not plan.enums:
             typing -= {"ClassVar"}

@@ -48,6 +48,10 @@ class Place:
         """The place of a record: without a frame."""
         return replace(self, envelope=None, address="", unique=False)
 
+    def within(self, envelope: Envelope) -> Place:
+        """The place in the frames of a direction."""
+        return replace(self, envelope=envelope) if self.envelope else self
+
     @property
     def prefix(self) -> str:
         """The byte order character of struct formats."""

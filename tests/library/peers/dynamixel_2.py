@@ -29,9 +29,12 @@ def _number(value: int | str, names: Mapping[str, int]) -> int:
     return names[value] if isinstance(value, str) else value
 
 
-def _error(fields: Fields) -> bytes:
+def _error(record: Record) -> bytes:
+    """The error of a status packet."""
+    if record["message"] != "status":
+        return b""
     names = {name: number for number, name in enumerate(_ERRORS)}
-    return bytes((_number(fields["error"], names) | fields["alert"] << 7,))
+    return bytes((_number(record["error_"], names) | record["alert"] << 7,))
 
 
 #: Message to its instruction and parameters.
@@ -56,14 +59,14 @@ _KINDS: Mapping[str, tuple[int, Callable[[Fields], bytes]]] = {
         0x92,
         lambda f: b"".join(struct.pack("<BHH", p["node"], p["start"], p["size"]) for p in f["places"]),
     ),
-    "status": (0x55, lambda f: _error(f) + _data(f)),
+    "status": (0x55, _data),
 }
 UNKNOWN: frozenset[str] = frozenset()
 
 
 def build(record: Record) -> bytes | None:
     instruction, parameters = _KINDS[record["message"]]
-    data = parameters(record["fields"])
+    data = _error(record) + parameters(record["fields"])
     head = (0xFF, 0xFF, 0xFD, 0, record["node"], *(len(data) + 3).to_bytes(2, "little"))
     handler = Protocol2PacketHandler()
     packet = handler.addStuffing([*head, instruction, *data, 0, 0])
@@ -80,5 +83,5 @@ def read(wire: bytes, direction: Direction) -> Record | None:
     assert result == COMM_SUCCESS
     node, error, data = packet[4], packet[8], bytes(packet[9:-2])
     named = dict(enumerate(_ERRORS)).get(error & 0x7F, error & 0x7F)
-    fields = {"error": named, "alert": bool(error & 0x80), "data": data.hex()}
-    return {"message": "status", "node": node, "fields": fields}
+    beside = {"error_": named, "alert": bool(error & 0x80)}
+    return {"message": "status", "node": node, **beside, "fields": {"data": data.hex()}}

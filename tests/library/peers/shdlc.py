@@ -52,5 +52,5 @@ def read(wire: bytes, direction: Direction) -> Record | None:
     assert builder.add_data(wire)
     node, command, state, data = builder.interpret_data()
     name = next(name for name, (number, *_) in _KINDS.items() if number == command)
-    fields = {"error": state & 0x7F, "device": bool(state & 0x80), **_KINDS[name][2](data)}
-    return {"message": f"{name}.response", "node": node, "fields": fields}
+    beside = {"error_": state & 0x7F, "device": bool(state & 0x80)}
+    return {"message": f"{name}.response", "node": node, **beside, "fields": _KINDS[name][2](data)}

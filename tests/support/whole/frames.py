@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from tests.support.whole import endings
+from tests.support.whole import endings, one_way
 from tests.support.whole.endings import Ending
 from tests.support.whole.mixed import Mixture
 from tests.support.whole.reference import checks
@@ -105,6 +105,11 @@ def choose(rng: random.Random, words: _Words) -> Shape:
         shape = _Parts(rng, words).make_ended(endings.choose(rng))
     else:
         shape = _Parts(rng, words).make(hunted=kind == "hunted")
+    # Drawn from another source: the schemas of earlier seeds stay what they are.
+    more = random.Random(repr(rng.getstate()))
+    if "parts" in shape.frame and not shape.seeds and more.random() < 0.2:
+        one_way.add(more, shape.frame, plain=kind == "ended" and "coding" not in shape.frame)
+        shape.directed = True
     if "parts" in shape.frame and rng.random() < 0.15:
         time = rng.choice(("3.5 bytes", "20 ms", "4 bytes"))
         least = {"at_least": rng.choice(("1750 us", "1 ms"))} if rng.random() < 0.5 else {}

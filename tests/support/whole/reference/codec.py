@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from tests.support.whole.reference import document, values
 from tests.support.whole.reference.asked import CARRIER, asked
-from tests.support.whole.reference.document import Direction, Fields, Message, part_doc, whole_span
+from tests.support.whole.reference.document import Direction, Fields, Message, Number, part_doc, whole_span
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.receivers import (
     Event,
@@ -37,9 +37,11 @@ class Reference:
         """Read the text of a schema."""
         data = document.load(text)
         shape = data["frame"]
-        self.frame: Frame | Marked | Packets = (
-            Frame(data) if "parts" in shape else Marked(data) if "marked" in shape else Packets(data)
-        )
+        if "parts" in shape:
+            self.frame: Frame | Marked | Packets = Frame(data, "response")
+            self.requests: Frame | Marked | Packets = Frame(data, "request")
+        else:
+            self.frame = self.requests = Marked(data) if "marked" in shape else Packets(data)
         parts = {**shape.get("parts", {}), **shape.get("packet", {})}
         sizes = [spec["size"] for spec in map(part_doc, parts.values()) if spec["role"] == "payload"]
         most = whole_span(sizes[0] if sizes else shape["marked"]["payload"])[1]
@@ -51,24 +53,33 @@ class Reference:
         ]
         self.address_name = addressed[0] if addressed else "address" if "marked" in shape else None
         self.messages = document.messages(data, Fields(data, most), self.address_name is not None)
-        if isinstance(self.frame, Frame):
-            self.frame.seeds = {
-                message.number: document.seeds(data, message.name) for message in self.messages
-            }
-        if isinstance(self.frame, Frame) and self.frame.beside:
-            self.messages = tuple(replace(each, beside=self.frame.beside) for each in self.messages)
+        for frame in (self.frame, self.requests):
+            if isinstance(frame, Frame):
+                frame.seeds = {each.number: document.seeds(data, each.name) for each in self.messages}
+        self.messages = tuple(replace(each, beside=self._beside(each)) for each in self.messages)
         trim = next((spec["trim"] for spec in map(part_doc, parts.values()) if "trim" in spec), None)
         if trim is not None:
             keep = 0 if trim == "zeros" else trim.get("keep", 0)
             self.messages = tuple(replace(each, trim=keep) for each in self.messages)
         self.asked = asked(data, Fields(data, most), self.messages)
         if self.asked is not None:
-            self.messages = (*self.messages, replace(self.asked.carrier, beside=self.messages[0].beside))
+            self.messages = (
+                *self.messages,
+                replace(self.asked.carrier, beside=self._beside(self.asked.carrier)),
+            )
         self.by_name = {message.name: message for message in self.messages}
         used = {message.direction for message in self.messages}
         self.directions: tuple[Direction, ...] = (
             ("message",) if used == {"message"} else ("request", "response")
         )
+
+    def frame_of(self, direction: Direction) -> Frame | Marked | Packets:
+        """The frame of a direction; only frames of parts can differ."""
+        return self.frame if direction == "response" else self.requests
+
+    def _beside(self, message: Message) -> tuple[tuple[str, Number], ...]:
+        frame = self.frame_of(message.direction)
+        return frame.beside if isinstance(frame, Frame) else ()
 
     def known(self, direction: Direction) -> dict[int, Message]:
         """The messages of a direction."""
@@ -108,7 +119,8 @@ class Reference:
         given: Mapping[str, Raw] | None = None,
     ) -> bytes:
         """A frame around a payload, which is not checked; `given` are values of the frame."""
-        message, frame = self.by_name[name], self.frame
+        message = self.by_name[name]
+        frame = self.frame_of(message.direction)
         if isinstance(frame, Frame):
             return frame.wrap(message.number, payload, address, given or {})
         if isinstance(frame, Marked):
@@ -119,18 +131,18 @@ class Reference:
         """Decode exactly one frame. Raises Wrong."""
         if not wire:
             raise Wrong("truncated")
-        known = self.known(direction)
-        if isinstance(self.frame, Packets):
+        known, frame = self.known(direction), self.frame_of(direction)
+        if isinstance(frame, Packets):
             message = known.get((request or wire)[0])
             if message is None:
                 raise Wrong("unknown")
-            payload = self.frame.opened(message, wire, request)
+            payload = frame.opened(message, wire, request)
             return Seen(message.name, None, values.decode(message, payload))
-        if isinstance(self.frame, Frame):
-            event = Searcher(self.frame, known).whole(wire)
+        if isinstance(frame, Frame):
+            event = Searcher(frame, known).whole(wire)
         else:
-            self.frame.check_ends(wire)
-            event = MarkedReceiver(self.frame, known).ended(wire)
+            frame.check_ends(wire)
+            event = MarkedReceiver(frame, known).ended(wire)
         if event.kind != "message":
             raise Wrong(event.kind)
         seen = Seen(event.name, event.address, event.values)
@@ -154,12 +166,12 @@ class Reference:
 
     def receiver(self, direction: Direction, asked: Sequence[bytes] = ()) -> Receiver:
         """A new receiver; `asked` are the requests that are answered."""
-        known = self.known(direction)
-        if isinstance(self.frame, Marked):
-            return MarkedReceiver(self.frame, known)
-        if isinstance(self.frame, Packets):
-            return PacketReceiver(self.frame, known, asked, answers=direction == "response")
-        return Hunter(self.frame, known) if self.frame.unique else Searcher(self.frame, known)
+        known, frame = self.known(direction), self.frame_of(direction)
+        if isinstance(frame, Marked):
+            return MarkedReceiver(frame, known)
+        if isinstance(frame, Packets):
+            return PacketReceiver(frame, known, asked, answers=direction == "response")
+        return Hunter(frame, known) if frame.unique else Searcher(frame, known)
 
     def events(self, direction: Direction, stream: bytes, asked: Sequence[bytes] = ()) -> list[Event]:
         """The events of a receiver, including those at the end of the stream."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import functools
 import itertools
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from tests.support.whole.reference import checks
@@ -130,6 +130,24 @@ def part_of(name: str, spec: object, order: str, fields: Fields) -> Part:
     return Part(name, role, len(pieces), spec, pieces=pieces, bits=bits, values=values)
 
 
+def _has(spec: object, direction: str) -> bool:
+    """Whether the frames of a direction have a part."""
+    if not isinstance(spec, dict) or "if" not in spec:
+        return True
+    wanted = spec["if"]["direction"]
+    return bool(wanted == direction or (wanted.startswith("not ") and wanted[4:] != direction))
+
+
+def _among(part: Part, names: Collection[str]) -> Part:
+    """A part that covers and counts none but these parts, and attributes."""
+    spec = dict(part.spec)
+    for key in ("over", "counts"):
+        if key in spec:
+            given = [spec[key]] if isinstance(spec[key], str) else spec[key]
+            spec[key] = [each for each in given if each in names or each.startswith("attribute.")]
+    return replace(part, spec=spec)
+
+
 def _bits_of_values(part: Part, given: Mapping[str, Raw]) -> int:
     raw = 0
     for name, shift, kind in part.values:
@@ -146,11 +164,14 @@ def _several(given: Any) -> list[int]:
 class Frame:
     """A delimited frame."""
 
-    def __init__(self, document: Doc) -> None:
-        """Read the parts."""
+    def __init__(self, document: Doc, direction: str = "") -> None:
+        """Read the parts of the frames of a direction; "" if both have the same."""
         frame, order = document["frame"], document.get("byteorder", "big")
         fields = Fields(document, 0)
-        self.parts = [part_of(name, spec, order, fields) for name, spec in frame["parts"].items()]
+        specs = {name: spec for name, spec in frame["parts"].items() if _has(spec, direction)}
+        #: Some parts are only in the frames of one direction.
+        self.one_way = any(isinstance(spec, dict) and "if" in spec for spec in frame["parts"].values())
+        self.parts = [_among(part_of(name, spec, order, fields), specs) for name, spec in specs.items()]
         self.by_role: Mapping[str, Part] = {part.role: part for part in self.parts[::-1]}
         #: Bytes of attributes of messages, by number of the message.
         self.seeds: dict[int, Mapping[str, bytes]] = {}
@@ -252,7 +273,7 @@ class Frame:
     def unique(self) -> bool:
         """Whether the preamble cannot occur inside a frame, so that a receiver can hunt for it."""
         stuffing, first = self.stuffing, self.parts[0]
-        if stuffing is None or stuffing.payload_alone or first.constant != stuffing.after * 2:
+        if self.one_way or stuffing is None or stuffing.payload_alone or first.constant != stuffing.after * 2:
             return False
         if (
             len(stuffing.after) != 1

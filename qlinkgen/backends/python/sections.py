@@ -1,0 +1,102 @@
+"""The sections of a module about its frames, rendered from their templates."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import jinja2
+
+from qlinkgen.backends import python_text
+from qlinkgen.backends.base import environment
+from qlinkgen.backends.python.frames import FrameView
+from qlinkgen.backends.python.ways import Ways, definitions, differing, merged
+from qlinkgen.model.message import Direction
+
+
+@functools.cache
+def templates() -> jinja2.Environment:
+    """The templates of this back-end, with a filter that quotes text."""
+    found = environment(__package__)
+    found.filters["docstring"] = lambda text: "\n".join(python_text.docstring([text]))
+    return found
+
+
+def way_class(direction: str) -> str:
+    """The base class of the messages of a direction, if the directions have different frames."""
+    return f"_{direction.title()}"
+
+
+@dataclass(frozen=True)
+class Sections:
+    """What is printed about frames before and after the classes.
+
+    Attributes:
+        views: the frame of each direction; that of both is called "".
+        received: the directions that are decoded.
+        beside: frames have values.
+    """
+
+    views: Mapping[str, FrameView]
+    received: Sequence[Direction]
+    beside: bool
+
+    @property
+    def directed(self) -> bool:
+        """Whether the directions have different frames."""
+        return len(self.views) > 1
+
+    @property
+    def _view(self) -> FrameView:
+        return list(self.views.values())[-1]
+
+    def _rendered(self, template: str, view: FrameView, **more: object) -> str:
+        found = templates().get_template(f"templates/{template}.j2")
+        return found.render(f=view, directed=self.directed, beside=self.beside, **more)
+
+    @functools.cached_property
+    def _made(self) -> Mapping[str, Mapping[str, str]]:
+        """Definitions for encoding and for the parts of frames, by direction."""
+        return {way: definitions(self._rendered("delimited", view)) for way, view in self.views.items()}
+
+    @functools.cached_property
+    def _found(self) -> Mapping[str, Mapping[str, str]]:
+        """Definitions for decoding, by direction."""
+        return {
+            way: definitions(self._rendered("delimited_search", view))
+            for way, view in self.views.items()
+            if way in self.received
+        }
+
+    @functools.cached_property
+    def ways(self) -> Ways:
+        """The names that are defined for each direction."""
+        if not self.directed:
+            return Ways(frozenset())
+        return differing([{**made, **self._found.get(way, {})} for way, made in self._made.items()])
+
+    @property
+    def frame(self) -> str:
+        """The section before the classes of messages."""
+        view = self._view
+        if view.template != "delimited":
+            return self._rendered(view.template, view).strip()
+        message = self._rendered("delimited_message", view)
+        if not self.directed:
+            return (self._rendered("delimited", view) + message).strip()
+        texts = [merged(self._made, self.ways), message]
+        for way, each in self.views.items():
+            text = self._rendered("delimited_way", each, base=way_class(way), way=way)
+            texts.append(self.ways.of(text, way))
+        return "\n\n\n".join(text.strip() for text in texts)
+
+    @property
+    def search(self) -> str:
+        """Functions that find frames in bytes."""
+        view = self._view
+        if view.template != "delimited":
+            return ""
+        if not self.directed:
+            return self._rendered("delimited_search", view)
+        return merged(self._found, self.ways).strip()
