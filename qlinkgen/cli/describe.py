@@ -69,6 +69,13 @@ def many_text(many: Many) -> str:
             assert_never(many)
 
 
+def steps_text(command: Command) -> str:
+    """Return the frames of a dialogue: ``sends load.request, receives ack, sends load.place``."""
+    frames = [("sends", command.request.name)]
+    frames += [("sends" if step.sent else "receives", step.message.name) for step in command.steps]
+    return "the master " + ", ".join(f"{verb} {name}" for verb, name in frames)
+
+
 def means_text(reply: Reply) -> str:
     """Return what a reply means: ``refused; code busy: again after 20 ms``."""
     times = {"again": f" after {time_text(reply.after)}" if time_text(reply.after) else "", "pending": ""}

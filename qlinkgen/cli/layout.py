@@ -88,6 +88,7 @@ def _facts(plan: Plan, planned: MessagePlan) -> list[str]:
         answer = f"answered within {within}" if within else "answered"
         answered = answer if command.response else "never answered"
         lines.extend([describe.many_text(command.many)] if command.many else [])
+        lines.extend([describe.steps_text(command)] if command.steps else [])
         lines.append(f"{answered}; repeat: {describe.repeat_text(command)}")
     if reply := plan.protocol.replies.get(message.name):
         lines.append(f"means {describe.means_text(reply)}")

@@ -11,7 +11,7 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.encode import address_option, compose, json_option
 from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, is_shipped, kind_of
-from qlinkgen.cli.send_bus import check_request, send_on_bus
+from qlinkgen.cli.send_bus import check_request, further_of, send_on_bus
 from qlinkgen.cli.wire_options import (
     Parity,
     attempts_option,
@@ -29,6 +29,7 @@ BELONGS: Belongs = {
     "attempts": (BUS, HOST),
     "slack": (BUS, HOST),
     "echo": (BUS,),
+    "then": (BUS,),
     "axis": (HOST,),
     "checksum": (HOST,),
     "check": (HOST,),
@@ -44,6 +45,12 @@ BELONGS: Belongs = {
 @click.argument("assignments", metavar="[FIELD=VALUE]...", nargs=-1)
 @address_option
 @json_option
+@click.option(
+    "--then",
+    metavar="OBJECT",
+    multiple=True,
+    help="Values of the next frame of a dialogue as JSON; once for each frame after the request.",
+)
 @baud_option
 @attempts_option
 @slack_option
@@ -82,6 +89,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     assignments: tuple[str, ...],
     addresses: tuple[str, ...],
     object_: str | None,
+    then: tuple[str, ...],
     baud: int | None,
     attempts: int,
     slack: float | None,
@@ -100,7 +108,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     PORT is a device such as /dev/ttyUSB0 or COM3, or a URL such as socket://HOST:PORT. MESSAGE and values are
     written as for encode. For a request without a response, nothing is printed. A request that is unsafe to
     repeat is sent once, regardless of --attempts; so is a message outside commands, which has no response.
-    The counter of a motion is sent as given.
+    The counter of a motion is sent as given. Of a command with steps, --then gives the values of each frame
+    after the request, and all answers are printed.
 
     On a ring, the command joins as an additional node: it forwards messages, prints those for this node, and
     leaves after --seconds, as soon as it forwards nothing. Delivery of the message is not confirmed. For
@@ -140,8 +149,9 @@ def command(  # noqa: PLR0917  # click passes them by name
             attempts=attempts, slack=slack, baud=baud, line=line,
         )  # fmt: skip
     else:
+        further = further_of(loaded, codec, found, addresses, then)
         send_on_bus(
-            loaded, codec, request, port, baud=baud, line=line,
+            loaded, codec, request, port, further=further, baud=baud, line=line,
             attempts=attempts, slack=slack, echo=echo, accepts=matching(protocol),
         )  # fmt: skip
 

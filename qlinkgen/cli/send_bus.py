@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import ModuleType
 from typing import cast
 
@@ -12,12 +12,14 @@ from qlinkgen.cli import jsonlines
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import warn
 from qlinkgen.cli.decode import message_record
-from qlinkgen.cli.wire_options import Line, echo_mode, open_line, speed
+from qlinkgen.cli.encode import compose
+from qlinkgen.cli.wire_options import Line, counted, echo_mode, open_line, speed
 from qlinkgen.errors import LinkError, Refused
 from qlinkgen.link.codec import Framed
+from qlinkgen.link.dialogue import Dialogue
 from qlinkgen.link.events import Event, Stray
 from qlinkgen.link.master import MasterEngine
-from qlinkgen.link.transaction import Accepts, Reply
+from qlinkgen.link.transaction import Accepts, Question, Reply
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.transport.blocking import BlockingMaster
@@ -31,6 +33,7 @@ def send_on_bus(
     request: Framed,
     port: str,
     *,
+    further: Sequence[Framed],
     baud: int | None,
     line: Line,
     attempts: int,
@@ -38,7 +41,10 @@ def send_on_bus(
     echo: str | None,
     accepts: Mapping[str, Accepts] | None,
 ) -> None:
-    """Send a request and print the response; send a message outside commands without waiting."""
+    """Send a request and print the response; send a message outside commands without waiting.
+
+    ``further`` are the frames of a dialogue after the request.
+    """
     with open_line(port, speed(protocol, baud), line) as opened:
         if request.NAME not in {command.request.name for command in protocol.commands}:
             _tell(opened, request.to_frame(), codec.BUS.bits_per_byte)
@@ -47,11 +53,12 @@ def send_on_bus(
         timing = timing_of(codec, opened, slack=slack, attempts=attempts)
         engine = MasterEngine(codec, timing, echo=echo_mode(protocol, echo), accepts=accepts)
         try:
-            reply = _transact(protocol, BlockingMaster(engine, opened), request)
+            question = Dialogue(request, further) if further else request
+            reply = _transact(protocol, BlockingMaster(engine, opened), question)
         except Refused as refusal:
             click.echo(jsonlines.line(message_record(protocol, cast("Framed", refusal.reply))))
             raise
-    answers = reply.response if isinstance(reply.response, list) else [reply.response]
+    answers = reply.response if type(reply.response) in {list, tuple} else [reply.response]
     for answer in answers:
         if answer is not None:
             click.echo(jsonlines.line(message_record(protocol, answer)))
@@ -71,7 +78,23 @@ def check_request(protocol: Protocol, message: Message) -> None:
         raise Failure(f"{message.name} is a response; send its request, {command.name}")
 
 
-def _transact(protocol: Protocol, master: BlockingMaster, request: Framed) -> Reply:
+def further_of(
+    protocol: Protocol, codec: ModuleType, message: Message, addresses: tuple[str, ...], given: Sequence[str]
+) -> list[Framed]:
+    """Return the frames of a dialogue after its request, from a JSON object for each."""
+    command = protocol.command_of(message)
+    steps = [step.message.name for step in command.steps if step.sent] if command else []
+    if len(given) != len(steps):
+        names = f": {', '.join(steps)}" if steps else ""
+        wanted = counted(len(steps), "frame")
+        raise Failure(f"{message.name} is followed by {wanted}{names}; pass --then OBJECT for each")
+    return [
+        cast("Framed", compose(protocol, name, (), addresses, text, codec=codec)[2])
+        for name, text in zip(steps, given, strict=True)
+    ]
+
+
+def _transact(protocol: Protocol, master: BlockingMaster, request: Question) -> Reply:
     """Perform a transaction; if it fails, show valid frames received that are not the response."""
     strays: list[Framed] = []
 

@@ -293,3 +293,19 @@ def test_a_full_disk_leaves_a_usable_bus() -> None:
         assert "No space left on device" in done.stderr
         assert "Traceback" not in done.stderr
         assert call("send", path, *request).returncode == 0
+
+
+def test_a_dialogue() -> None:
+    schema = str(SCHEMAS / "answers.yaml")
+    with simulated(schema, "--nodes", "3") as (path, _):
+        asked = ("send", path, schema, "transfer", "--node", "3", "number=5", *CALM)
+        done = call(*asked, "--then", '{"start": 2}', "--then", '{"data": "0102"}')
+        assert (done.returncode, done.stderr) == (0, "")
+        acknowledged = {"message": "ack", "node": 3, "fields": {}}
+        written = {"message": "transfer.written", "node": 3, "fields": {"number": 5, "size": 0}}
+        assert objects(done.stdout) == [acknowledged, acknowledged, written]
+        done = call(*asked, "--then", '{"start": 2}')
+        assert done.returncode == 2
+        assert (
+            "followed by 2 frames: transfer.place, transfer.block; pass --then OBJECT for each" in done.stderr
+        )
