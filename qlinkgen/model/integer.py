@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
+from qlinkgen.model.digits import Digits
+
 ByteOrder = Literal["big", "little"]
 #: Order of numbers of a few bits in a row of bits: the first one is in the least, or most, significant bits.
 BitOrder = Literal["least", "most"]
@@ -90,23 +92,32 @@ class Integer:
     chunks: tuple[Chunk, ...]
     #: Binary-coded decimal: each four bits are a digit.
     bcd: bool = False
+    #: Its digits, if it is sent as text; it has no chunks then.
+    text: Digits | None = None
 
     @property
     def size(self) -> int:
-        """Bytes on the wire."""
-        return len(self.chunks)
+        """Bytes on the wire, the maximum of a text."""
+        return self.text.most if self.text else len(self.chunks)
+
+    @property
+    def form(self) -> str:
+        """How its digits are written, for descriptions; "" if it is binary."""
+        return f" {self.text}" if self.text else " bcd" if self.bcd else ""
 
     @property
     def minimum(self) -> int:
         """Minimum value that the bits can hold."""
-        return -(1 << (self.bits - 1)) if self.signed else 0
+        least = -(1 << (self.bits - 1)) if self.signed else 0
+        return max(least, self.text.lowest) if self.text else least
 
     @property
     def maximum(self) -> int:
         """Maximum value that the bits can hold."""
         if self.bcd:
             return int("9" * (self.bits // 4))
-        return (1 << (self.bits - self.signed)) - 1
+        most = (1 << (self.bits - self.signed)) - 1
+        return min(most, self.text.highest) if self.text else most
 
     @property
     def mask(self) -> int:
@@ -126,10 +137,14 @@ class Integer:
         """The wire bytes of a value. Raises ValueError if it does not fit."""
         if not self.minimum <= value <= self.maximum:
             raise ValueError(f"{value} does not fit {self.bits} bits")
+        if self.text:
+            return self.text.text(value)
         return pack_chunks(int(str(value), 16) if self.bcd else value, self.chunks)
 
     def unpack(self, data: bytes) -> int:
-        """The value in its wire bytes; unused bits and digits above 9 are not refused, see `stray`."""
+        """The value in its wire bytes; unused bits and wrong digits are not refused, see `stray`."""
+        if self.text:
+            return self.text.number(data) or 0
         pattern = unpack_chunks(data, self.chunks)
         if self.bcd:
             return sum((pattern >> 4 * place & 0xF) * 10**place for place in range(self.bits // 4))
@@ -140,7 +155,11 @@ class Integer:
         return bits - (1 << self.bits) if self.signed and bits >> (self.bits - 1) else bits
 
     def stray(self, data: bytes) -> bool:
-        """Whether unused bits are set, or a digit is above 9, so that the bytes are invalid."""
+        """Whether unused bits are set or digits are wrong, so that the bytes are invalid."""
+        if self.text:
+            number = self.text.number(data)
+            signed = data[:1] in (b"+", b"-") and self.minimum >= 0
+            return number is None or signed or not self.minimum <= number <= self.maximum
         if self.bcd:
             return not data.hex().isdecimal()
         return any(byte & ~chunk.mask for byte, chunk in zip(data, self.chunks, strict=True))

@@ -14,6 +14,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import ClassVar, Literal
 
+from qlinkgen.model.digits import Digits
 from qlinkgen.model.floats import Float
 from qlinkgen.model.integer import BitOrder, ByteOrder, Chunk, Integer, byte_chunks, group_chunks, packed_size
 from qlinkgen.model.texts import Text
@@ -177,6 +178,8 @@ class Scalar:
     chunks: tuple[Chunk, ...]
     #: Binary-coded decimal.
     bcd: bool = False
+    #: Its digits, if it is sent as text.
+    text: Digits | None = None
     minimum: int
     maximum: int
     default: int = 0
@@ -189,13 +192,13 @@ class Scalar:
 
     @property
     def size(self) -> int:
-        """Bytes on the wire."""
-        return len(self.chunks)
+        """Bytes on the wire, the maximum of a text."""
+        return self.integer.size
 
     @cached_property
     def integer(self) -> Integer:
         """Its wire layout."""
-        return Integer(self.bits, self.signed, self.chunks, self.bcd)
+        return Integer(self.bits, self.signed, self.chunks, self.bcd, self.text)
 
     @property
     def byteorder(self) -> ByteOrder | None:

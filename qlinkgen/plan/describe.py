@@ -196,8 +196,8 @@ def _scalar_text(scalar: Scalar) -> str:
 
 def integer_text(integer: Integer) -> str:
     """``u8``, ``i32 little``, ``u14 in groups: bits 7-13 0-6``."""
-    base = f"{'i' if integer.signed else 'u'}{integer.bits}{' bcd' if integer.bcd else ''}"
-    if integer.size <= 1:
+    base = f"{'i' if integer.signed else 'u'}{integer.bits}{integer.form}"
+    if integer.size <= 1 or integer.text:
         return base
     if integer.byteorder:
         return f"{base} {integer.byteorder}"

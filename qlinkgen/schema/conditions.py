@@ -73,7 +73,13 @@ class ConditionBuilder:
             self._error(field.name, "if", what, hint)
             return None
         kind = value.type
-        plain = isinstance(kind, Scalar) and kind.scaling is None and not kind.bcd and kind.integer.bits <= 64
+        plain = (
+            isinstance(kind, Scalar)
+            and kind.scaling is None
+            and not kind.bcd
+            and kind.text is None
+            and kind.integer.bits <= 64
+        )
         if not plain or (isinstance(kind, Scalar) and isinstance(kind.meaning, Float)):
             what = f"{text.field} cannot decide whether {field.name} is present"
             self._error(field.name, "if", what, "name a whole number of up to 64 bits, an enum or a bool")

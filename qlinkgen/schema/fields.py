@@ -46,6 +46,7 @@ class FieldBuilder:
         for name, spec in specs.items():
             kind = self._kind(spec, (*path, name))
             if kind is not None:
+                self._check_text(kind, (*path, name))
                 doc, confirmed = self._inherited(spec)
                 fields.append(Field(name, kind, doc, spec.section, confirmed, spec.echo))
         fields = with_beside(fields, specs, path, self._report)
@@ -53,6 +54,14 @@ class FieldBuilder:
         fields = self._counted(fields, path, asked)
         self._check_open_ends(fields, path)
         return tuple(self._bounded(fields, path))
+
+    def _check_text(self, kind: FieldType, path: Path) -> None:
+        """Check that a receiver finds the end of a number as text."""
+        number = kind.item if isinstance(kind, Array) else kind
+        if isinstance(number, Scalar) and number.text and not number.text.fixed:
+            what = f"the text of {path[-1]} has {number.text.least} to {number.text.most} characters"
+            hint = f"use a constant number, as: {number.text.name}[{number.text.most}]"
+            self._report.error("bad-digits", path, what, hint, of_key=True)
 
     def _kind(self, spec: FieldSpec, path: Path) -> FieldType | None:
         record = self._records.named(spec)

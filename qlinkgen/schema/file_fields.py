@@ -92,8 +92,10 @@ class FieldSpec(Fact, Lifetime):
     pad: ByteText | None = Field(
         default=None, description="Byte that fills up text or bytes of a constant size; not part of the value"
     )
-    as_: Literal["bcd"] | None = Field(
-        default=None, alias="as", description="Form of the number: bcd, two decimal digits a byte"
+    as_: str | None = Field(
+        default=None,
+        alias="as",
+        description="Form of the number: bcd, two digits a byte; decimal[6], decimal[1..6], hex[4], as text",
     )
     packed: Literal["least", "most"] | None = Field(
         default=None, description="An array of bits in a row: which bits of a byte its first item has"

@@ -81,6 +81,12 @@ _ALL = (
         "Other widths do not fill whole bytes; use bits, or groups whose parts cover each bit once.",
     ),
     Rule(
+        "bad-digits",
+        "A number as text has room for its digits, and a receiver finds its end.",
+        "Decimal digits show steps of 1, 1/10, 1/100 and so on exactly, and no others. A text of varying "
+        "size ends at a separator.",
+    ),
+    Rule(
         "not-applicable",
         "A key is used only with types that it applies to.",
         "A scale on text or a count on a number would have no effect.",

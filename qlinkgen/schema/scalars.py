@@ -24,6 +24,7 @@ from qlinkgen.model.types import (
 from qlinkgen.schema.constants import INTEGER, MAX_BITS, MAX_WIDE_BITS, carrier, integer_range
 from qlinkgen.schema.file_fields import FieldSpec
 from qlinkgen.schema.file_model import SchemaFile
+from qlinkgen.schema.forms import formed
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.numbers import defaulted, quantified
@@ -139,13 +140,12 @@ class ScalarBuilder:
         chunks = self._chunks(spec, plain.bits, base, location)
         if chunks is None:
             return None
-        bcd = spec.as_ == "bcd" and self._check_decimal(spec, plain, base, location)
         low, high = (0, 1) if plain.meaning == "bool" else integer_range(plain.bits, signed=plain.signed)
-        high = int("9" * (plain.bits // 4)) if bcd else high
         scalar = Scalar(
-            bits=plain.bits, signed=plain.signed, chunks=chunks, bcd=bcd, minimum=low, maximum=high,
+            bits=plain.bits, signed=plain.signed, chunks=chunks, minimum=low, maximum=high,
             scaling=plain.scaling, meaning=plain.meaning, unit=spec.unit or "",
         )  # fmt: skip
+        scalar = formed(scalar, spec, base, location, grouped=self._file.groups is not None)
         _check_keys(spec, plain, location)
         if plain.bits > MAX_BITS:
             what = f"an integer of more than {MAX_BITS} bits"
@@ -162,16 +162,6 @@ class ScalarBuilder:
         if spec.reserved:
             return replace(scalar, role=Reserved())
         return scalar if spec.const is None else replace(scalar, role=Constant())
-
-    def _check_decimal(self, spec: FieldSpec, plain: Plain, base: str, location: Location) -> bool:
-        """Whether the number can be in binary-coded decimal."""
-        if plain.meaning is not None or plain.scaling is not None or plain.signed:
-            location.reject(spec, ("as",), base, "use an unsigned integer")
-            return False
-        if spec.counts is not None or spec.groups or self._file.groups:
-            location.reject(spec, ("as",), "a count" if spec.counts else "groups of bits")
-            return False
-        return spec.packed is None
 
     def _in_a_row(
         self, spec: FieldSpec, bits: int, base: str, location: Location

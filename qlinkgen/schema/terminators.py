@@ -170,6 +170,8 @@ def _bytes_of_number(number: Scalar) -> Alphabet:
     # A receiver ignores reserved bytes, so another sender may fill them.
     elif isinstance(number.role, Reserved):
         low, high = number.natural_minimum, number.natural_maximum
+    if number.text:
+        return number.text.alphabet
     if number.bcd:
         low, high = int(str(low), 16), int(str(high), 16)
     return _joined(values_of(chunk, low, high) for chunk in number.chunks)

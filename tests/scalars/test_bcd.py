@@ -107,7 +107,7 @@ def test_members_in_c() -> None:
         ("{type: u14, as: bcd, groups: {bits: 7, first: most}}",
          "'as' has no effect on groups of bits; remove it"),
         ('{type: "u4[2]", as: bcd, packed: most}', "'as' has no effect on bits in a row; remove it"),
-        ("{type: u8, as: bdc}", "'bdc' is not allowed here; did you mean 'bcd'?"),
+        ("{type: u8, as: bdc}", "'bdc' is not a form of a number; did you mean 'bcd'?"),
     ],
 )  # fmt: skip
 def test_wrong_keys(field: str, text: str) -> None:

@@ -97,11 +97,11 @@ def _length(length: Length) -> str:
 
 
 def _integer(integer: Integer) -> str:
-    return f"{'i' if integer.signed else 'u'}{integer.bits}{' bcd' if integer.bcd else ''}"
+    return f"{'i' if integer.signed else 'u'}{integer.bits}{integer.form}"
 
 
 def _order(integer: Integer) -> str:
-    if integer.size == 1:
+    if integer.size == 1 or integer.text:
         return ""
     return {"big": " be", "little": " le", None: f" in {integer.size} groups"}[integer.byteorder]
 
@@ -132,7 +132,7 @@ def _facts(scalar: Scalar) -> list[str]:
         )
     elif scalar.unit:
         facts.append(f"in {scalar.unit}")
-    if (not scalar.full_range and scalar.meaning != "bool") or scalar.bcd:
+    if (not scalar.full_range and scalar.meaning != "bool") or scalar.integer.form:
         facts.append(f"{scalar.minimum}..{scalar.maximum}")
     match scalar.meaning:
         case Enum() | Flags():

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 from qlinkgen.backends.c.forms import Helper, decimal_helpers, row_helpers, wide_helpers
 from qlinkgen.backends.c.names import storage, unsigned, unsigned_type
+from qlinkgen.backends.c.text_forms import Verb, text_helpers
+from qlinkgen.model.digits import Digits
 from qlinkgen.model.integer import BitOrder, Chunk, Integer
 from qlinkgen.model.types import Scalar
 
@@ -29,6 +31,8 @@ class Layouts:
     _wides: set[tuple[str, str]] = field(default_factory=set)
     #: Numbers in binary-coded decimal that are read, written or checked: width of the C type, and the order.
     _decimals: set[tuple[str, int, str]] = field(default_factory=set)
+    #: Numbers as text that are read or written: the base, and the function.
+    _texts: set[tuple[int, Verb]] = field(default_factory=set)
     #: Rows of bits that are read or written: the width of the C type of an item, and the order.
     _rows: set[tuple[str, int, BitOrder]] = field(default_factory=set)
     #: Widths of the C types that need sign extension.
@@ -40,6 +44,9 @@ class Layouts:
             return f"{self._wide('put', integer)}({pointer(place, index)}, {integer.size}U, {value});"
         if integer.bcd:
             return f"{self._decimal('put', integer)}({pointer(place, index)}, {integer.size}U, {value});"
+        if integer.text:
+            given = pointer(place, index), f"{integer.size}U", value
+            return f"{self.text('put', integer, integer.text, *given)};"
         if integer.size == 1:
             if integer.signed and integer.bits < 8:  # clear the sign extension
                 value = f"(uint8_t)({value} & {unsigned(integer.chunks[0].mask, 8, hexadecimal=True)})"
@@ -52,6 +59,8 @@ class Layouts:
             return f"{self._wide('get', integer)}({pointer(place, index)}, {integer.size}U)"
         if integer.bcd:
             return f"{self._decimal('get', integer)}({pointer(place, index)}, {integer.size}U)"
+        if integer.text:
+            return self.read(integer, integer.text, pointer(place, index), f"{integer.size}U")
         if integer.size == 1:
             return f"{place}[{index}]"
         return f"{self._call('get', integer)}({pointer(place, index)})"
@@ -69,6 +78,8 @@ class Layouts:
         if integer.bcd:
             self._decimals.add(("check", 8, ""))
             return f"!{self.prefix}_is_bcd_({pointer(place, index)}, {integer.size}U)"
+        if integer.text:
+            return self.wrong(integer, integer.text, pointer(place, index), f"{integer.size}U")
         if all(chunk.bits == 8 for chunk in integer.chunks):
             return None
         if integer.size == 1:
@@ -77,6 +88,40 @@ class Layouts:
             )
         self._partial.add((integer.bits, integer.chunks))
         return f"{self._call('unused_bits', integer)}({pointer(place, index)})"
+
+    def text(self, verb: Verb, integer: AnyInteger, text: Digits, *given: str) -> str:
+        """A call that writes a number as text: to a place, its size, the value; or its size: the value."""
+        self._texts.add((text.base, verb))
+        name = f"{self.prefix}_{verb}_{'decimal' if text.base == 10 else 'hex'}_"
+        *others, value = given
+        others += [f"{text.least}U"] if verb == "size" else []
+        wide = f"(uint64_t){value}" if storage(integer.bits) < 64 else value
+        if text.base == 16:
+            return f"{name}({', '.join([*others, wide])})"
+        if integer.signed and integer.bits != storage(integer.bits):
+            wide = f"({wide} & {unsigned((1 << integer.bits) - 1, 64, hexadecimal=True)})"
+        sign = unsigned(1 << (integer.bits - 1) if integer.signed else 0, 64, hexadecimal=integer.signed)
+        return f"{name}({', '.join([*others, f'{text.point}U', wide, sign])})"
+
+    def read(self, integer: AnyInteger, text: Digits, place: str, size: str) -> str:
+        """An expression for the unsigned value of a text."""
+        call = self._text_call("get", integer, text, place, size)
+        if integer.signed and integer.bits != storage(integer.bits):
+            call = f"({call} & {unsigned((1 << integer.bits) - 1, 64, hexadecimal=True)})"
+        return call if storage(integer.bits) == 64 else f"({unsigned_type(integer.bits)}){call}"
+
+    def wrong(self, integer: AnyInteger, text: Digits, place: str, size: str) -> str:
+        """A condition that holds where a text is not a number that the integer can hold."""
+        return f"!{self._text_call('is', integer, text, place, size)}"
+
+    def _text_call(self, verb: str, integer: AnyInteger, text: Digits, place: str, size: str) -> str:
+        self._texts.add((text.base, "get"))
+        wire = integer.integer if isinstance(integer, Scalar) else integer
+        most = unsigned(wire.maximum, 64)
+        if text.base == 16:
+            return f"{self.prefix}_{verb}_hex_({place}, {size}, {most})"
+        limits = f"{text.point}U, {unsigned(-wire.minimum, 64)}, {most}"
+        return f"{self.prefix}_{verb}_decimal_({place}, {size}, {limits})"
 
     def _decimal(self, verb: str, integer: AnyInteger) -> str:
         width, order = storage(integer.bits), "be" if integer.byteorder == "big" else "le"
@@ -120,6 +165,7 @@ class Layouts:
             *whole,
             *wide_helpers(self.prefix, self._wides),
             *decimal_helpers(self.prefix, self._decimals),
+            *text_helpers(self.prefix, self._texts),
             *row_helpers(self.prefix, self._rows),
         ]
 

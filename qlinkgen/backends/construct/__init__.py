@@ -38,11 +38,12 @@ _SUPPORT = {
     "_ended": "Add Cobs Digits EndedFrame Escape Pair",
     "_fasked": "Asked Told",
     "_frecords": "Record",
+    "_ftexts": "TextNumber",
     "_ftrimmed": "Trimmed",
     "_fwalks": "Walked",
 }
 #: Copied only if a tree uses them.
-_OPTIONAL = ("_ended", "_fasked", "_frecords", "_ftrimmed", "_fwalks", "_packed")
+_OPTIONAL = tuple(name for name in _SUPPORT if name not in ("_fields", "_frames"))
 _ORIGINS = {"Decimal": "decimal"} | {
     name: f".{file}" for file, names in _SUPPORT.items() for name in names.split()
 }
@@ -75,7 +76,7 @@ def _imports(everything: tuple[Definition, ...]) -> str:
     blocks = (
         ["decimal"],
         ["construct"],
-        ["._ended", "._fasked", "._fields", "._frames", "._frecords", "._ftrimmed", "._fwalks", "._packed"],
+        sorted(f".{name}" for name in _SUPPORT),
     )
     lines = (
         "".join(_import(origin, by_origin[origin]) for origin in block if origin in by_origin)

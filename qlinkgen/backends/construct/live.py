@@ -45,7 +45,17 @@ class Live:
 
 def live(protocol: Protocol, options: Options | None = None) -> Live:
     """The structures of a protocol."""
-    own = ("_fields", "_frames", "_frecords", "_ftrimmed", "_fwalks", "_packed", "_ended", "_fasked")
+    own = (
+        "_fields",
+        "_frames",
+        "_frecords",
+        "_ftexts",
+        "_ftrimmed",
+        "_fwalks",
+        "_packed",
+        "_ended",
+        "_fasked",
+    )
     modules = ("construct", *(f"{__package__}.{name}" for name in own))
     names: dict[str, Value] = {"Decimal": Decimal, "float": float}
     for module in modules:

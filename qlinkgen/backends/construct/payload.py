@@ -46,6 +46,10 @@ _UNCONFIRMED = "NOT CONFIRMED by a second source."
 def integer(kind: Integer, *, signed: bool | None = None) -> Node:
     """The construct of an integer, Groups if construct does not provide one."""
     signed = kind.signed if signed is None else signed
+    if text := kind.text:
+        limits = (("low", kind.minimum), ("high", kind.maximum))
+        point = (("point", text.point),) if text.point else ()
+        return Call("TextNumber", (text.base, text.least, text.most), limits + point)
     if kind.bcd:
         swapped = (("swapped", True),) if kind.byteorder == "little" and kind.size > 1 else ()
         return Call("BcdInteger", (kind.size,), swapped)

@@ -269,6 +269,11 @@ class Decoder:
         taken = integers.get(integer, local, self.place.byteorder)
         if not taken.terms:
             return
+        if integer.text:
+            text = f"{local.removesuffix('_raw')}_text"
+            self._values += [f"{text} = {local}", f"{local} = {self._number_in(integer, text)}"]
+            self._refuse(f"{local} > {integer.maximum}", name, text, offset)
+            return
         if integer.bcd:
             self._values.append(f"{local} = {integers.digits(integer, local)}")
             self._refuse(f"not {local}.isdecimal()", name, local, offset)
@@ -278,6 +283,12 @@ class Decoder:
         self._values.append(f"{local} = {' | '.join(taken.terms)}")
         if integer.byteorder is None and integer.signed:
             self._values.append(f"{local} = {integers.sign_extended(local, integer.bits)}")
+
+    def _number_in(self, integer: Integer, text: str) -> str:
+        """The number of a text, above its maximum if it is illegal."""
+        assert integer.text
+        self.place.use("read_decimal" if integer.text.base == 10 else "read_hexadecimal")
+        return integers.number_in(integer, text)
 
     def _size(self, integer: Integer, local: str, at: Size, name: str = "", offset: str = "") -> str:
         """Unpack a number for comparison with sizes, before values are checked."""
@@ -624,6 +635,11 @@ class Decoder:
         places = f"for index in range(0, len({raw}), {size})"
         if item.bcd:
             self._refuse(f"{raw} and not {raw}.hex().isdecimal()", step.name, raw, self._offset(step))
+        if item.text:
+            number = self._number_in(item, f"{raw}[index : index + {size}]")
+            self._values.append(f"{target} = [{number} {places}]")
+            self._refuse(f"max({target}, default=0) > {item.maximum}", step.name, raw, self._offset(step))
+            return
         if item.byteorder is not None:
             number = integers.from_bytes(item, f"{raw}[index : index + {size}]")
         else:

@@ -216,8 +216,14 @@ class Encoder:
         row.arguments.extend(arguments)
 
     def _integer(self, integer: Integer, number: str) -> None:
+        self._use_text(integer)
         code, arguments = integers.put(integer, number, self.place.byteorder)
         self._add(code, *arguments)
+
+    def _use_text(self, integer: Integer) -> None:
+        """Import what writes the text of a number."""
+        if integer.text and integer.text.point:
+            self.place.use("decimal")
 
     def _step(self, step: Step) -> None:
         match step:
@@ -397,7 +403,8 @@ class Encoder:
         for rule in rules:
             self._terms.append(f"all({integers.holds(rule, 'item')} for item in {local})")
         octets = f"{step.name}_octets"
-        if step.item.byteorder is None:
+        self._use_text(step.item)
+        if step.item.byteorder is None and not step.item.text:
             groups = [integers.group_out("item", chunk) for chunk in step.item.chunks]
             data = f"bytes(({', '.join(groups)}{',' if len(groups) == 1 else ''}))"
         else:

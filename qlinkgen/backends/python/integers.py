@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.backends.python.layout import slice_of
+from qlinkgen.model.digits import Digits
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
 
@@ -37,6 +38,7 @@ def letter(integer: Integer, byteorder: ByteOrder) -> str:
     if (
         not known
         or integer.bcd
+        or integer.text
         or integer.byteorder is None
         or (integer.size > 1 and integer.byteorder != byteorder)
     ):
@@ -48,17 +50,35 @@ def put(integer: Integer, number: str, byteorder: ByteOrder) -> tuple[str, tuple
     """Format and arguments that pack a number, which must be a plain name because groups repeat it."""
     if code := letter(integer, byteorder):
         return code, (number,)
-    if integer.byteorder is not None:
+    if integer.text or integer.byteorder is not None:
         return f"{integer.size}s", (to_bytes(integer, number),)
     return "B" * integer.size, tuple(group_out(number, chunk) for chunk in integer.chunks)
 
 
 def to_bytes(integer: Integer, number: str) -> str:
     """The bytes of an integer; raises OverflowError if it does not fit. ``number`` must be a primary."""
+    if integer.text:
+        return text_of(integer.text, number)
     if integer.bcd:
         back = "[::-1]" if integer.byteorder == "little" else ""
         return f'bytes.fromhex(f"{{{number}:0{2 * integer.size}d}}"){back}'
     return f'{number}.to_bytes({integer.size}, "{integer.byteorder}"{_signed(integer)})'
+
+
+def text_of(text: Digits, number: str) -> str:
+    """The text of a number."""
+    if text.point:
+        return f"decimal({number}, {text.least}, {text.point})"
+    letter = "d" if text.base == 10 else "X"
+    return f'b"%{f"0{text.least}" if text.least > 1 else ""}{letter}" % {number}'
+
+
+def number_in(integer: Integer, text: str) -> str:
+    """The number of a text, or one above the maximum of the integer."""
+    assert integer.text
+    if integer.text.base == 16:
+        return f"read_hexadecimal({text}, {integer.maximum})"
+    return f"read_decimal({text}, {integer.text.point}, {integer.minimum}, {integer.maximum})"
 
 
 def digits(integer: Integer, data: str) -> str:
@@ -68,6 +88,8 @@ def digits(integer: Integer, data: str) -> str:
 
 def from_bytes(integer: Integer, data: str) -> str:
     """The integer of a byte string."""
+    if integer.text:
+        return number_in(integer, data)
     if integer.bcd:
         return f"int({digits(integer, data)})"
     return f'int.from_bytes({data}, "{integer.byteorder}"{_signed(integer)})'
@@ -81,7 +103,7 @@ def get(integer: Integer, local: str, byteorder: ByteOrder) -> Get:
     """The code that unpacks a number; names of its variables begin with ``local``."""
     if code := letter(integer, byteorder):
         return Get(code, (local,))
-    if integer.byteorder is not None:
+    if integer.text or integer.byteorder is not None:
         return Get(f"{integer.size}s", (local,), (from_bytes(integer, local),))
     targets = tuple(f"{local}_{index}" for index in range(integer.size))
     return Get("B" * integer.size, targets, group_terms(integer, targets), stray(integer, targets))

@@ -32,6 +32,7 @@ _RECORD = "BaseRecord"
 #: Modules that are written only where used, in the order of their names.
 _SHARED: Mapping[str, Sequence[str]] = {
     "_checks": ("Checksum", "adler", "crc", "find_crc", "fletcher", "sum_of", "wrong_check", "xor_of"),
+    "_digits": ("BetweenRule", "decimal", "read_decimal", "read_hexadecimal", "start_of"),
     "_records": (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records"),
     "_rules": ("FloatRule", "ListRule", "PaddedRule"),
     "_rwalks": ("MaybeRule", "Misplaced", "NEW", "misplaced"),

@@ -412,6 +412,9 @@ def _beside(name: str, integer: Integer, rules: Iterable[Condition]) -> Iterator
     for rule in rules:
         for number in _outside(rule, integer.minimum, integer.maximum):
             yield name, number, integer.pack(number)
+    if integer.text and integer.text.fixed:
+        data = b"G" * integer.size
+        yield name, integer.unpack(data), data
     if integer.bcd:
         data = bytes((0xA5, *bytes(integer.size - 1)))
         yield name, integer.unpack(data), data

@@ -385,7 +385,7 @@ class FieldMaker:
         made: Callable[[], tuple[Any, int]] = rng.choice(
             (self._plain, self._plain, self._plain, self._ranged, self._truth, self._of_enum, self._of_flags,
              self._scaled, self._fixed_point, self._constant, self._reserved, self._grouped, self._of_named,
-             self._real, self._digits, self._wide)
+             self._real, self._digits, self._text_number, self._wide)
         )  # fmt: skip
         return made()
 
@@ -506,6 +506,29 @@ class FieldMaker:
             spec[rng.choice(("default", "const"))] = rng.choice((most, rng.randint(0, most)))
         return spec, size
 
+    def _text_number(self) -> tuple[Any, int]:
+        """A number as text of a constant number of characters."""
+        rng = self.rng
+        if self.shape.groups:
+            return self._plain()
+        kind = rng.choice(("u8", "u16", "i16", "u24", "i24", "i32", "u64", "i64"))
+        if kind[0] == "u" and rng.random() < 0.4:
+            size = rng.choice((1, 2, 4, 5))
+            spec: Doc = {"type": kind, "as": f"hex[{size}]"}
+            most = min(16**size, 1 << int(kind[1:])) - 1
+        else:
+            point = rng.choice((0, 0, 1, 2, 4))
+            size = point + 2 + rng.choice((0, 1, 2, 5))
+            spec = {"type": kind, "as": f"decimal[{size}]"}
+            spec |= {"scale": f"1/{10**point}"} if point else {}
+            most = min(10 ** (size - (point > 0)), 1 << int(kind[1:]) - (kind[0] == "i")) - 1
+        if "scale" not in spec and rng.random() < 0.5:
+            low = rng.randint(0, most)
+            spec["range"] = f"{low}..{rng.randint(low, most)}"
+            if rng.random() < 0.3:
+                spec["const"] = low
+        return spec, size
+
     def _real(self) -> tuple[Any, int]:
         """A floating-point number."""
         rng, kind = self.rng, self.rng.choice(("f16", "f32", "f32", "f64"))
@@ -578,6 +601,7 @@ class FieldMaker:
                 self._fixed_point,
                 self._of_named,
                 self._digits,
+                self._text_number,
             )
         )
         spec, size = made()

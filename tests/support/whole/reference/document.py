@@ -62,6 +62,9 @@ class Number:
     forbidden: int = 0
     #: Each byte has two decimal digits.
     bcd: bool = False
+    #: Of a number as text: base, minimum and maximum number of characters, digits after the point, whether
+    #: it may have a sign.
+    text: tuple[int, int, int, int, bool] | None = None
     #: The integer is the bits of a floating-point number, perhaps with bounds.
     real: bool = False
     bounds: tuple[float, float] | None = None
@@ -385,6 +388,24 @@ def part_doc(given: object) -> Doc:
     return {"role": next((role for key, role in told.items() if key in given), "value"), **given}
 
 
+def _as_text(number: Number, spec: Doc) -> Number:
+    """A number that is sent as text; a shorter text than the type needs limits it."""
+    name, _, span = spec["as"].rstrip("]").partition("[")
+    point = 0
+    while name == "decimal" and Fraction(str(spec.get("scale", 1))) * 10**point < 1:
+        point += 1
+    base = 10 if name == "decimal" else 16
+    longest = max(len(f"{abs(each):d}" if base == 10 else f"{each:x}") for each in (number.low, number.high))
+    longest = max(longest, point + 1) + (point > 0) + (number.low < 0)
+    least, most = whole_span(span) if span else (1, longest)
+    assert most is not None
+    digits = most - (point > 0)
+    low = -(10 ** (digits - 1)) + 1 if digits - 1 > point else 0
+    high = min(number.high, base**digits - 1)
+    text = (base, least, most, point, max(number.low, low) < 0)
+    return replace(number, low=max(number.low, low), high=high, text=text, pieces=((0, 8),) * most)
+
+
 def byte_pieces(size: int, order: str) -> tuple[tuple[int, int], ...]:
     """An integer of whole bytes."""
     pieces = tuple((8 * index, 8) for index in range(size))
@@ -554,9 +575,10 @@ class Fields:
         high = 1 if truth else (1 << bits - signed) - 1
         real, bcd = base in ("f16", "f32", "f64"), spec.get("as") == "bcd"
         high = 10 ** (bits // 4) - 1 if bcd else high
-        return Number(
+        number = Number(
             bits, signed, pieces, low, high, 0, scale, Fraction(0), truth, forbidden, bcd=bcd, real=real
         )
+        return _as_text(number, spec) if str(spec.get("as", "bcd")) != "bcd" else number
 
     def _carrier(self, base: str) -> tuple[int, bool, Fraction | None, bool, int]:
         if base == "bool":

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from decimal import Decimal
+from fractions import Fraction
 from typing import TypeAlias
 
 from tests.support.whole.reference.document import (
@@ -127,11 +129,18 @@ def _encoded(slots: Sequence[Slot], slot: Slot, values: Mapping[str, Raw]) -> by
 
 
 def _put(number: Number, raw: int) -> bytes:
+    if number.text:
+        base, least, _, point, _ = number.text
+        if base == 16:
+            return format(raw, f"0{least}X").encode()
+        return format(Decimal(raw).scaleb(-point), f"0{least}.{point}f").encode()
     return put(number.pieces, int(str(raw), 16) if number.bcd else raw)
 
 
 def _get(number: Number, data: bytes) -> int:
-    """The integer of wire bytes. Raises Wrong for a digit above 9."""
+    """The integer of wire bytes. Raises Wrong for a wrong digit."""
+    if number.text:
+        return _of_text(number, data, number.text)
     pattern = get(number.pieces, data)
     if not number.bcd:
         return pattern
@@ -139,6 +148,20 @@ def _get(number: Number, data: bytes) -> int:
     if not text.isdecimal():
         raise Wrong("range", text)
     return int(text)
+
+
+def _of_text(number: Number, data: bytes, text: tuple[int, int, int, int, bool]) -> int:
+    """The integer of a text. Raises Wrong."""
+    base, _, _, point, signed = text
+    alphabet = b"0123456789abcdefABCDEF" if base == 16 else b"0123456789."
+    digits = data[1:] if signed and data[:1] in (b"+", b"-") else data
+    if any(each not in alphabet for each in digits) or digits.count(b".") > 1 or not digits.strip(b"."):
+        raise Wrong("range", str(data))
+    value = Fraction(int(digits, 16)) if base == 16 else Fraction(digits.decode()) * 10**point
+    value = -value if data[:1] == b"-" else value
+    if value.denominator != 1 or not number.low <= value <= number.high:
+        raise Wrong("range", str(data))
+    return int(value)
 
 
 def _number(number: Number, raw: Raw) -> int:

@@ -1,0 +1,32 @@
+"""Numbers as text.
+
+Copied next to the modules that need it, unchanged.
+"""
+
+from __future__ import annotations
+
+
+def decimal(number: int, least: int, point: int) -> bytes:
+    """The decimal text of a number in steps of 10 ** -point, of at least so many characters."""
+    digits = b"%0*d" % (point + 1, abs(number))
+    text = digits[:-point] + b"." + digits[-point:] if point else digits
+    return b"-" + text.rjust(least - 1, b"0") if number < 0 else text.rjust(least, b"0")
+
+
+def read_decimal(text: bytes, point: int, low: int, high: int) -> int:
+    """The number of a decimal text, in steps of 10 ** -point; high + 1 if it is not one from low to high."""
+    sign = text[:1]
+    if low < 0 and sign in (b"-", b"+"):
+        text = text[1:]
+    whole, _, fraction = text.partition(b".")
+    if not (whole + fraction).isdigit() or fraction[point:].strip(b"0"):
+        return high + 1
+    number = int(whole + fraction[:point].ljust(point, b"0") or b"0")
+    number = -number if sign == b"-" else number
+    return number if low <= number <= high else high + 1
+
+
+def read_hexadecimal(text: bytes, high: int) -> int:
+    """The number of hexadecimal digits of either case; high + 1 if it is not one up to high."""
+    number = int(text, 16) if text.isalnum() and not text.upper().strip(b"0123456789ABCDEF") else high + 1
+    return min(number, high + 1)

@@ -1,0 +1,81 @@
+"""Numbers as text: decimal or hexadecimal digits."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+_DECIMAL = re.compile(rb"[+-]?([0-9]*)\.?([0-9]*)\Z")
+_HEXADECIMAL = re.compile(rb"[0-9A-Fa-f]+\Z")
+
+
+@dataclass(frozen=True, slots=True)
+class Digits:
+    """A number as text.
+
+    Attributes:
+        base: decimal numbers have a sign if they may be negative.
+        least: characters that are sent at least; zeros fill them up.
+        most: maximum number of characters.
+        point: number of digits after the decimal point; 0: there is no point.
+    """
+
+    base: Literal[10, 16]
+    least: int
+    most: int
+    point: int = 0
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the number of characters is constant."""
+        return self.least == self.most
+
+    @property
+    def shortest(self) -> int:
+        """Minimum number of characters that are received."""
+        return self.least if self.fixed else 1
+
+    @property
+    def highest(self) -> int:
+        """Greatest number whose text is not too long."""
+        return int(self.base ** max(0, self.most - bool(self.point))) - 1
+
+    @property
+    def lowest(self) -> int:
+        """Least number whose text is not too long."""
+        digits = self.most - bool(self.point) - 1
+        return 1 - 10**digits if self.base == 10 and digits > self.point else 0
+
+    @property
+    def alphabet(self) -> frozenset[int]:
+        """The bytes of a text."""
+        return frozenset(b"0123456789ABCDEFabcdef" if self.base == 16 else b"+-.0123456789")
+
+    def text(self, number: int) -> bytes:
+        """The text of a number; it is longer than ``most`` if the number is not in range."""
+        if self.base == 16:
+            return b"%0*X" % (self.least, number)
+        digits = b"%0*d" % (self.point + 1, abs(number))
+        whole = digits[: -self.point] + b"." + digits[-self.point :] if self.point else digits
+        sign = b"-" if number < 0 else b""
+        return sign + whole.rjust(self.least - len(sign), b"0")
+
+    def number(self, text: bytes) -> int | None:
+        """The number of a text, None if it has none in these steps. Digits beyond the point may be zeros."""
+        if self.base == 16:
+            return int(text, 16) if _HEXADECIMAL.match(text) else None
+        found = _DECIMAL.match(text)
+        if found is None or not found[1] + found[2] or found[2][self.point :].strip(b"0"):
+            return None
+        number = int(found[1] + found[2][: self.point].ljust(self.point, b"0") or b"0")
+        return -number if text.startswith(b"-") else number
+
+    @property
+    def name(self) -> str:
+        """The form as written in a schema, without the number of characters."""
+        return "decimal" if self.base == 10 else "hex"
+
+    def __str__(self) -> str:
+        """As written in a schema."""
+        return f"{self.name}[{self.least}]" if self.fixed else f"{self.name}[{self.least}..{self.most}]"
