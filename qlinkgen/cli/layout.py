@@ -105,11 +105,13 @@ def _layout(title: str, stated: Message | Layout, payload: PayloadPlan) -> None:
     table = Table(COLUMNS, title, frozenset({"offset", "bytes"}))
     values, docs = {value.name: value for value in stated.values}, stated.docs
     moving = [step for segment in payload.segments[1:] for step in segment.steps]
+    moving += payload.steps[1:] if payload.separator else []
     for field, step in zip(stated.fields, payload.steps, strict=True):
         offset = step.place.offset
         notes = ["echo"] if field.echo else []
         notes += [] if field.confirmed else [UNCONFIRMED]
-        notes += [presence_text(step.presence)] if step.presence else []
+        if step.presence:
+            notes.append("empty if absent" if payload.separator else presence_text(step.presence))
         if step in moving:
             offset = None
         table.add(

@@ -35,6 +35,7 @@ from qlinkgen.plan.payload import (
     least_size,
     term_of,
 )
+from qlinkgen.plan.separated import TextStep, characters, needed
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -117,7 +118,12 @@ def show_message_plan(plan: Plan, message: MessagePlan) -> None:
     if sizes:
         heading("Sizes, in this order")
         paragraph([*sizes, f"{len(sizes) + 1}. the payload has {size_text(payload.size)} bytes"])
-    if payload.walked:
+    if payload.separator:
+        least, most = needed(payload), len(payload.steps)
+        texts = f"{span_text(least, most)} texts, divided by {payload.separator.decode()!r}"
+        heading("Texts")
+        paragraph([texts, "an absent field is empty; at the end it is left out"] if least < most else [texts])
+    elif payload.walked:
         heading("Walked in this order")
         walk = [f"{index}. {segment_text(each)}" for index, each in enumerate(payload.segments, 1)]
         paragraph([*walk, f"{len(walk) + 1}. no bytes are left"])
@@ -130,10 +136,11 @@ def _steps(title: str, payload: PayloadPlan) -> None:
     columns = ["offset", "from end", "bytes", "step", "kind", "type", "must be"]
     table = Table(columns, title, frozenset({"offset", "from end", "bytes"}))
     moving = [step for segment in payload.segments[1:] for step in segment.steps]
+    moving += payload.steps[1:] if payload.separator else []
     for step in payload.steps:
         back = "" if step.place.back is None else step.place.back
         table.add(
-            "..." if step in moving else size_text(step.place.front), back, _bytes(step), step.name,
+            "..." if step in moving else size_text(step.place.front), back, _bytes(step, payload), step.name,
             kind_text(step), type_text(step), must_text(step),
         )  # fmt: skip
         for member in step.members if isinstance(step, BitsStep) else ():
@@ -143,8 +150,10 @@ def _steps(title: str, payload: PayloadPlan) -> None:
     table.show()
 
 
-def _bytes(step: Step) -> str:
+def _bytes(step: Step, payload: PayloadPlan) -> str:
     """Return the size of a step in bytes."""
+    if payload.separator and isinstance(step, TextStep):
+        return span_text(*characters(step))
     if isinstance(step, BytesStep | ItemsStep | RecordsStep) and not step.fixed:
         return term_text(term_of(step))
     return str(least_size(step))

@@ -39,6 +39,7 @@ _AROUND = {
     Around.LOST: ("(preamble)", "rest of the preamble"),
     Around.INSERTED: ("(stuffing)", "inserted"),
     Around.UNCLEAR: ("(coded)", "cannot be decoded"),
+    Around.SEPARATOR: ("(separator)", ""),
     Around.EXTRA: ("(extra)", "outside all fields"),
     Around.NEXT: ("(next frame)", "begins inside this one"),
     Around.AFTER: ("(after)", "not part of the frame"),

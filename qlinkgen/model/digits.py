@@ -18,7 +18,7 @@ class Digits:
         base: decimal numbers have a sign if they may be negative.
         least: characters that are sent at least; zeros fill them up.
         most: maximum number of characters.
-        point: number of digits after the decimal point; 0: there is no point.
+        point: number of digits after the decimal point, 0 without one.
     """
 
     base: Literal[10, 16]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, assert_never
@@ -118,7 +118,9 @@ class Field:
         match self.type:
             case Blob() | Array() | Records():
                 return self.type.size_of(self.type.length.minimum)
-            case Scalar() | Bits() | Record():
+            case Scalar():
+                return self.type.least_size
+            case Bits() | Record():
                 return self.type.size
             case _:
                 assert_never(self.type)
@@ -149,6 +151,8 @@ class Field:
         """Whether the size is constant."""
         if self.conditional:
             return False
+        if isinstance(self.type, Scalar):
+            return self.type.text is None or self.type.text.fixed
         return not isinstance(self.type, Blob | Array | Records) or self.type.length.fixed
 
 
@@ -187,6 +191,13 @@ def greatest_size(fields: Iterable[Field]) -> int:
         numbers = turning_points(each.when[0] for each in group)
         size += max(sum(each.max_size for each in group if each.when[0].holds(raw)) for raw in numbers)
     return size
+
+
+def separated_size(fields: Sequence[Field]) -> tuple[int, int]:
+    """The minimum and maximum size of fields with separators between them."""
+    needed = max((index for index, each in enumerate(fields, 1) if not each.optional), default=0)
+    least = sum(each.min_size for each in fields[:needed]) + max(0, needed - 1)
+    return least, sum(each.max_size for each in fields) + len(fields) - 1
 
 
 def values_of(fields: Iterable[Field]) -> Iterator[Value]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from qlinkgen.model.fields import Field, Value, docs_of, greatest_size, values_of
+from qlinkgen.model.fields import Field, Value, docs_of, greatest_size, separated_size, values_of
 from qlinkgen.model.texts import Text
 
 __all__ = ["Direction", "Field", "Message", "Value"]
@@ -58,21 +58,25 @@ class Message:
     seeds: tuple[tuple[str, bytes], ...] = ()
     #: It carries the answers with its number, which only their request tells apart.
     carries: bool = False
+    #: The byte between fields, which are texts; b"" if there is none.
+    separator: bytes = b""
 
     @cached_property
     def min_size(self) -> int:
         """Minimum size of the payload, without regard to ``empty_is_default``."""
+        if self.separator:
+            return separated_size(self.fields)[0]
         return sum(field.min_size for field in self.fields)
 
     @cached_property
     def max_size(self) -> int:
         """Maximum size of the payload."""
-        return greatest_size(self.fields)
+        return separated_size(self.fields)[1] if self.separator else greatest_size(self.fields)
 
     @property
     def fixed(self) -> bool:
         """Whether the size of the payload is constant."""
-        return all(field.fixed for field in self.fields)
+        return not self.separator and all(field.fixed for field in self.fields)
 
     @cached_property
     def variable(self) -> tuple[Field, ...]:

@@ -195,6 +195,11 @@ class Scalar:
         """Bytes on the wire, the maximum of a text."""
         return self.integer.size
 
+    @property
+    def least_size(self) -> int:
+        """Minimum number of bytes on the wire."""
+        return self.text.shortest if self.text else self.size
+
     @cached_property
     def integer(self) -> Integer:
         """Its wire layout."""
@@ -316,6 +321,8 @@ class Blob:
     default: bytes = b""
     #: The byte that fills it up to its constant size; not part of the value. b"": it is not filled up.
     pad: bytes = b""
+    #: Characters that a text between separators does not have.
+    excluded: bytes = b""
     #: The caller must provide the value: it has no default, and empty is not legal.
     required: bool = False
 

@@ -36,6 +36,7 @@ from qlinkgen.plan.payload import (
     limits,
     term_of,
 )
+from qlinkgen.plan.separated import joined, visit
 from qlinkgen.plan.walk import Missing, Wrong, present
 
 Raw: TypeAlias = "int | bytes | list[int] | Mapping[str, Raw] | Sequence[Mapping[str, Raw]] | None"
@@ -89,10 +90,20 @@ class MoreNeeded(Exception):
 def pack(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
     """The payload with these values, defaults for missing ones. Raises Unsendable."""
     whole = {each.name: values.get(each.name, default_of(each)) for each in plan.settable}
+    if plan.separator:
+        return _pack_separated(plan, whole)
     if plan.walked:
         return _pack_walked(plan, whole)
     counts = {run.name: _count(run, whole[run.name]) for run in plan.runs}
     return plan.trimmed(b"".join(_packed(step, whole, counts) for step in plan.steps))
+
+
+def _pack_separated(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
+    texts = []
+    for step in plan.steps:
+        absent = step.presence is not None and values[step.name] is None
+        texts.append(b"" if absent else _packed(step, values, {}))
+    return joined(plan, texts)
 
 
 def _pack_walked(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
@@ -209,7 +220,7 @@ def _checked(name: str, number: Scalar, value: object) -> int:
 
 
 def _octets(step: BytesStep, value: object) -> bytes:
-    if not isinstance(value, bytes) or (step.text and not value.isascii()):
+    if not isinstance(value, bytes) or (step.text and not value.isascii()) or {*value} & {*step.excluded}:
         raise Unsendable(step.name, value)
     padded = step.padded(value)
     if step.stripped(padded) != value:
@@ -250,7 +261,7 @@ def unpack(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
 def _unpack_walked(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
     values: dict[str, Raw] = {}
     try:
-        for each in walk.visit(plan, payload):
+        for each in visit(plan, payload):
             if each.data is None:
                 values |= {holder.name: None for holder in holders((each.step,))}
             else:
@@ -270,7 +281,7 @@ def _counts_of(step: Step, data: bytes) -> Mapping[str, int]:
 def places(plan: PayloadPlan, payload: bytes) -> Iterator[tuple[Step, int]]:
     """The steps of a valid payload, zeros at its end included, and their offsets, without absent ones."""
     if plan.walked:
-        yield from ((each.step, each.at) for each in walk.visit(plan, payload) if each.data is not None)
+        yield from ((each.step, each.at) for each in visit(plan, payload) if each.data is not None)
         return
     counts = count_items(plan, payload)
     yield from ((step, step.place.front.value(counts)) for step in plan.steps)
@@ -355,7 +366,7 @@ def _unpacked(step: Step, data: bytes, counts: Mapping[str, int], at: int) -> di
             return _members(step, _valid(step.name, step.integer, (), data, at), at)
         case BytesStep():
             taken = step.stripped(data[: counts.get(step.name, step.length.maximum)])
-            if step.text and not taken.isascii():
+            if (step.text and not taken.isascii()) or {*taken} & {*step.excluded}:
                 raise BadContent("range", step.name, at)
             return {step.name: taken}
         case ItemsStep():

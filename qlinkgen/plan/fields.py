@@ -28,9 +28,9 @@ from qlinkgen.plan.payload import (
     least_size,
     term_of,
 )
+from qlinkgen.plan.separated import visit
 from qlinkgen.plan.spans import Around, Span
 from qlinkgen.plan.walk import Wrong as WrongSize
-from qlinkgen.plan.walk import visit
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +80,10 @@ class Fields:
         at = 0
         try:
             for each in visit(self._plan, self._payload):
+                self._between(at, each.at)
+                at = each.at
                 if each.data is not None:
-                    at = each.at + len(each.data)
+                    at += len(each.data)
                     self._step(each.step, tuple(range(each.at, at)), len(each.data))
         except WrongSize as wrong:
             self.bad = self._sound
@@ -90,6 +92,12 @@ class Fields:
                 at = min(max(at, begin + full_size(step)), len(self._payload))
                 self._step(step, tuple(range(min(begin, at), at)), full_size(step))
         self._extra(at)
+
+    def _between(self, at: int, begin: int) -> None:
+        """Add the separator before a field."""
+        if self._plan.separator and begin > at:
+            places = tuple(range(at, begin))
+            self.spans.append(Span(Around.SEPARATOR, places, self._payload[at:begin], len(places)))
 
     def _extra(self, at: int) -> None:
         """Add the bytes after the last step."""
@@ -138,7 +146,7 @@ class Fields:
             case BitsStep():
                 self._members(step, self._integer(step, step.integer, (), places), places)
             case BytesStep():
-                high = (at for at in places if step.text and self._payload[at] >= 0x80)
+                high = (at for at in places if _is_barred(step, self._payload[at]))
                 self._span(step, places, None, next(high, None))
             case ItemsStep():
                 self._items(step, raw, places)
@@ -224,6 +232,11 @@ class Fields:
         if isinstance(of, ItemsStep):
             return of.item.unpack(self._payload[at : at + of.item_size])
         return self._payload[at]
+
+
+def _is_barred(step: BytesStep, octet: int) -> bool:
+    """Whether a text does not have the byte."""
+    return (step.text and octet >= 0x80) or octet in step.excluded
 
 
 def _is_refused(integer: Integer, rules: tuple[Condition, ...], raw: bytes) -> bool:

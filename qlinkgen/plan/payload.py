@@ -174,6 +174,8 @@ class BytesStep:
     default: bytes
     #: The byte that fills up a shorter value, which does not end with it; b"" if there is none.
     pad: bytes
+    #: Characters that a text between separators does not have.
+    excluded: bytes
     required: bool
     presence: Presence | None = None
 
@@ -373,6 +375,8 @@ class PayloadPlan:
         empty_is_default: an empty payload means that every field has its default.
         segments: how a payload is walked in which fields may be absent; () for all others. ``sizing`` and
             ``size`` are then empty.
+        separator: the byte between the fields, each of which is a text; b"" if there is none. ``sizing``,
+            ``size`` and places mean nothing then.
         trim: bytes that are sent at least where zeros at the end are not; None if all are sent. ``least``
             is then the minimum size without them.
     """
@@ -384,6 +388,7 @@ class PayloadPlan:
     most: int
     empty_is_default: bool
     segments: tuple[Segment, ...] = ()
+    separator: bytes = b""
     trim: int | None = None
 
     def trimmed(self, payload: bytes) -> bytes:
@@ -398,8 +403,8 @@ class PayloadPlan:
 
     @property
     def walked(self) -> bool:
-        """Whether places of fields depend on earlier values, not on counts alone."""
-        return bool(self.segments)
+        """Whether places of fields depend on earlier values or texts, not on counts alone."""
+        return bool(self.segments or self.separator)
 
     @property
     def fixed(self) -> bool:

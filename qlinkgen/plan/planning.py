@@ -47,6 +47,8 @@ from qlinkgen.plan.payload import (
 
 def payload_plan(message: Message, trim: int | None = None) -> PayloadPlan:
     """Plan the payload of a message; see `PayloadPlan` for ``trim``."""
+    if message.separator:
+        return _Planner(message.fields).separated(message)
     plan = _Planner(message.fields).plan(empty_is_default=message.empty_is_default)
     return plan if trim is None else replace(plan, trim=trim, least=min(trim, plan.most))
 
@@ -81,6 +83,19 @@ class _Planner:
             empty_is_default=empty_is_default,
         )
 
+    def separated(self, message: Message) -> PayloadPlan:
+        """Texts between separators."""
+        steps = [_present(self._step(field, Place(Size(), None)), _presence(field)) for field in self._all]
+        return PayloadPlan(
+            steps=tuple(steps),
+            sizing=(),
+            size=Size(),
+            least=message.min_size,
+            most=message.max_size,
+            empty_is_default=False,
+            separator=message.separator,
+        )
+
     def _walked(self) -> PayloadPlan:
         segments = tuple(self._segments())
         return PayloadPlan(
@@ -110,9 +125,7 @@ class _Planner:
             yield Segment(tuple(steps), None, size)
 
     def _own_segment(self, field: Field, after: tuple[Field, ...]) -> Segment:
-        presence = None
-        if field.conditional:
-            presence = Presence(field.name, field.when, field.optional, field.given)
+        presence = _presence(field)
         step = _present(self._step(field, Place(Size(), None)), presence)
         kind = field.type
         if not isinstance(kind, Blob | Array | Records) or kind.length.fixed:
@@ -130,7 +143,14 @@ class _Planner:
                 return BitsStep(field.name, place, kind.container.integer, tuple(map(_member, kind.members)))
             case Blob():
                 return BytesStep(
-                    field.name, place, kind.text, kind.length, kind.default, kind.pad, kind.required
+                    field.name,
+                    place,
+                    kind.text,
+                    kind.length,
+                    kind.default,
+                    kind.pad,
+                    kind.excluded,
+                    kind.required,
                 )
             case Array():
                 return ItemsStep(
@@ -191,6 +211,13 @@ def _size_of(fields: Iterable[Field]) -> Size:
     for field in fields:
         size = size + field.max_size if field.fixed else size.plus(_term(field.name, field.type))
     return size
+
+
+def _presence(field: Field) -> Presence | None:
+    """What decides whether a field is present, None if it always is."""
+    if not field.conditional:
+        return None
+    return Presence(field.name, field.when, field.optional, field.given)
 
 
 def _present(step: Step, presence: Presence | None) -> Step:

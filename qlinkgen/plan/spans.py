@@ -24,6 +24,8 @@ class Around(Enum):
     INSERTED = "inserted"
     #: A coded byte that cannot be decoded, or that follows one.
     UNCLEAR = "unclear"
+    #: Between two fields.
+    SEPARATOR = "separator"
     #: In the payload, after the last step.
     EXTRA = "extra"
     #: The next frame, which begins before this one is complete.

@@ -181,7 +181,9 @@ class CommandBuilder:
         self._check_answered(addressing, response, path)
         section, build = self._section(spec), self._build.directed
         place = (*path, "request") if spec.request is not None else ("defaults", "request")
-        written = Written("request", StatedId(spec.id), (*path, "id"), request or {}, place)
+        written = Written(
+            "request", StatedId(spec.id), (*path, "id"), request or {}, place, (), spec.separator
+        )
         asked = build(name, spec, written, addressing=addressing, section=section)
         self.messages.append(asked)
         if response is None or response == "none":
@@ -206,7 +208,12 @@ class CommandBuilder:
                 number, number_path = each.id, (*where, "id")
                 break
         written = Written(
-            "response", number.of(spec.id), number_path, fields or {}, fields_path(given, place)
+            "response",
+            number.of(spec.id),
+            number_path,
+            fields or {},
+            fields_path(given, place),
+            separator=spec.separator,
         )
         return given if isinstance(given, str) else fields, written
 

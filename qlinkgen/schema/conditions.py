@@ -19,8 +19,9 @@ _RULE = "bad-condition"
 class ConditionBuilder:
     """Adds the conditions to the fields of one message."""
 
-    def __init__(self, specs: Fields, path: Path, report: Reporter) -> None:
-        """``specs`` are the fields as written."""
+    def __init__(self, specs: Fields, path: Path, report: Reporter, *, separated: bool = False) -> None:
+        """``specs`` are the fields as written; ``separated``: texts between separators, any may be empty."""
+        self._separated = separated
         self._specs = specs
         self._path = path
         self._report = report
@@ -36,7 +37,7 @@ class ConditionBuilder:
             when = self._condition(field, spec.when or (), found)
             given = not spec.optional and self._holds(when, found)
             found.append(replace(field, when=when, optional=spec.optional, given=given))
-        for field in found:
+        for field in () if self._separated else found:
             self._check(field, found)
             if any(each.conditional for each in found) and _is_packed_run(field):
                 what = f"{field.name} is packed and of variable size, in a message whose fields may be absent"

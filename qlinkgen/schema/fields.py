@@ -36,31 +36,35 @@ class FieldBuilder:
         """Report errors in records at their definition, whether used or not."""
         self._records.check()
 
-    def build(self, specs: Fields, path: Path, asked: Collection[str] = ()) -> tuple[Field, ...]:
+    def build(
+        self, specs: Fields, path: Path, asked: Collection[str] = (), *, separated: bool = False
+    ) -> tuple[Field, ...]:
         """The fields of one message, without those that cannot be built.
 
-        ``asked`` are those with a number of items from the request.
+        ``asked`` are those with a number of items from the request; ``separated``: texts between separators.
         """
         specs = with_counts(specs, path, self._report)
         fields: list[Field] = []
         for name, spec in specs.items():
             kind = self._kind(spec, (*path, name))
             if kind is not None:
-                self._check_text(kind, (*path, name))
+                if not separated:
+                    self._check_text(kind, (*path, name))
                 doc, confirmed = self._inherited(spec)
                 fields.append(Field(name, kind, doc, spec.section, confirmed, spec.echo))
         fields = with_beside(fields, specs, path, self._report)
-        fields = ConditionBuilder(specs, path, self._report).build(fields)
+        fields = ConditionBuilder(specs, path, self._report, separated=separated).build(fields)
         fields = self._counted(fields, path, asked)
-        self._check_open_ends(fields, path)
-        return tuple(self._bounded(fields, path))
+        if not separated:
+            self._check_open_ends(fields, path)
+        return tuple(self._bounded(fields, path, separators=len(fields) - 1 if separated else 0))
 
     def _check_text(self, kind: FieldType, path: Path) -> None:
         """Check that a receiver finds the end of a number as text."""
         number = kind.item if isinstance(kind, Array) else kind
         if isinstance(number, Scalar) and number.text and not number.text.fixed:
             what = f"the text of {path[-1]} has {number.text.least} to {number.text.most} characters"
-            hint = f"use a constant number, as: {number.text.name}[{number.text.most}]"
+            hint = f"use a constant number, as: {number.text.name}[{number.text.most}], or a separator"
             self._report.error("bad-digits", path, what, hint, of_key=True)
 
     def _kind(self, spec: FieldSpec, path: Path) -> FieldType | None:
@@ -196,12 +200,12 @@ class FieldBuilder:
                 needs = ((*path, name), (*path, count), (*path, field.name), *counts)
                 self._report.error("bad-count", (*path, count, "counts"), what, hint, needs=needs)
 
-    def _bounded(self, fields: Sequence[Field], path: Path) -> list[Field]:
+    def _bounded(self, fields: Sequence[Field], path: Path, *, separators: int) -> list[Field]:
         """The fields; those without a bound are limited to the rest of the payload."""
         unbounded = {field.name for field in fields if (*path, field.name) in self._types.unbounded}
         bounded = [field for field in fields if field.name not in unbounded]
         return [
-            self._filled(field, self._room(field, bounded), fields, path)
+            self._filled(field, self._room(field, bounded) - separators, fields, path)
             if field.name in unbounded
             else field
             for field in fields

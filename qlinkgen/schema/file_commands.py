@@ -29,6 +29,7 @@ from qlinkgen.schema.kinds import (
     Id,
     Label,
     Name,
+    Separator,
     ShortForm,
     Text,
     TextId,
@@ -217,6 +218,9 @@ class ReplySpec(Fact):
     """An answer other than the response."""
 
     id: AnswerNumber | None = Field(default=None, description="Its number: 0x15 or request.id + 0x80")
+    separator: Separator | None = Field(
+        default=None, description="Character between the fields, which are texts; none: there is none"
+    )
     fields: Fields = Field(description="Its fields, in wire order")
     means: Annotated[MeansSpec, ShortForm("default", "string")] = Field(
         default_factory=MeansSpec, description="refused, again, pending or done; or by a field"
@@ -254,6 +258,9 @@ class DefaultsSpec(FileMapping):
     response: Response | None = Field(
         default=None,
         description="Fields, {} for an empty one, {id:, fields:}, the name of a message, or none",
+    )
+    separator: Separator | None = Field(
+        default=None, description="Character between the fields, which are texts; none: there is none"
     )
     addressing: Addressing | None = Field(
         default=None, description="Nodes addressed, and which of them respond"
@@ -299,6 +306,9 @@ class CommandSpec(Fact, Lifetime):
         default=None,
         description="Fields, {} for an empty one, {id:, fields:}, the name of a message, or none",
     )
+    separator: Separator | None = Field(
+        default=None, description="Character between the fields, which are texts; none: there is none"
+    )
     replies: Replies = Field(
         default_factory=dict, description="Answers other than the response; they replace those of the file"
     )
@@ -324,6 +334,9 @@ class MessageSpec(Fact, Lifetime):
 
     id: MessageId | None = Field(
         default=None, description="Its number in the frame; PART: NUMBER for each part, if there are several"
+    )
+    separator: Separator | None = Field(
+        default=None, description="Character between the fields, which are texts; none: there is none"
     )
     fields: Fields = Field(description="Its fields, in wire order")
     direction: Literal["request", "response"] | None = Field(

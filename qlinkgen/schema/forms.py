@@ -77,7 +77,7 @@ def _point(scalar: Scalar, spec: FieldSpec, location: Location) -> int | None:
     point = len(str(scale.denominator)) - 1
     if scale != Fraction(1, 10**point) or spec.offset:
         what = f"{spec.type} in steps of {scale}" + (f" from {spec.offset}" if spec.offset else "")
-        hint = "use a scale such as 1/100 without an offset, with a range"
+        hint = "use a scale such as 1/100 without an offset"
         location.fault(
             "bad-digits", "offset" if spec.offset else "as", f"decimal digits do not show {what}", hint
         )

@@ -120,6 +120,17 @@ WholeRange = Annotated[
     PlainValidator(notation.whole_range),
     _json("first..last of whole numbers, or one number", "string", "integer"),
 ]
+
+
+def _separator(value: object) -> bytes:
+    """The byte of a separator; b"" for none."""
+    if value == "none":
+        return b""
+    if isinstance(value, str) and len(value) == 1 and value.isascii():
+        return value.encode()
+    raise ValueError(f"{shown(value)} is not one character; write one like ',' or none")
+
+
 ByteText = Annotated[
     bytes,
     PlainValidator(notation.byte_string),
@@ -130,6 +141,11 @@ ByteCount = Annotated[
 ]
 Characters = Annotated[
     str, BeforeValidator(_characters), WithJsonSchema({"type": "string", "pattern": "^[ -~]+$"})
+]
+Separator = Annotated[
+    bytes,
+    PlainValidator(_separator),
+    _json("One character between fields, like ','; or none", "string"),
 ]
 AnyCondition = Annotated[
     tuple[notation.TestText, ...],

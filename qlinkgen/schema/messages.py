@@ -20,6 +20,7 @@ from qlinkgen.schema.notation import StatedId
 from qlinkgen.schema.pieces import IdBuilder
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.seeds import SeedBuilder
+from qlinkgen.schema.separated import check_separator, separated
 from qlinkgen.schema.source import Path
 
 _FRAME: Path = ("frame",)
@@ -35,6 +36,7 @@ class Written(NamedTuple):
         fields: its fields.
         path: their place.
         asked: those with a number of items from the request.
+        separator: the byte between them, None if it is that of the defaults.
     """
 
     part: str
@@ -43,6 +45,7 @@ class Written(NamedTuple):
     fields: Fields
     path: Path
     asked: Collection[str] = ()
+    separator: bytes | None = None
 
 
 class MessageBuilder:
@@ -88,7 +91,7 @@ class MessageBuilder:
             command=name,
             direction=direction,
             id=number,
-            fields=self._fields.build(layout.fields, layout.path, layout.asked),
+            fields=self._fields_of(layout),
             doc=spec.doc,
             section=section,
             confirmed=spec.confirmed,
@@ -98,6 +101,7 @@ class MessageBuilder:
             addresses=ranges,
             default_address=default,
             seeds=self._seeds.of_command(name, number),
+            separator=self._separator(layout),
         )
         self._add(message, layout)
         return message
@@ -126,7 +130,7 @@ class MessageBuilder:
             command=command or name,
             direction=direction,
             id=number,
-            fields=self._fields.build(layout.fields, layout.path),
+            fields=self._fields_of(layout),
             doc=spec.doc,
             section=spec.section,
             confirmed=spec.confirmed,
@@ -135,9 +139,29 @@ class MessageBuilder:
             addresses=ranges,
             default_address=default,
             seeds=self._seeds.of_command(command, number),
+            separator=self._separator(layout),
         )
         self._add(message, layout)
         return message
+
+    def _separator(self, layout: Written) -> bytes:
+        """The separator of a message, which may be that of the defaults; b"" without fields."""
+        usual = self._file.defaults.separator or b""
+        return (usual if layout.separator is None else layout.separator) if layout.fields else b""
+
+    def _fields_of(self, layout: Written) -> tuple[Field, ...]:
+        fields = self._fields.build(
+            layout.fields,
+            layout.path,
+            layout.asked,
+            separated=bool(separator := self._separator(layout)),
+        )
+        if not separator:
+            return fields
+        for name in layout.asked:
+            what = f"the size of {name} follows from the separator after it"
+            self._report.error("bad-separator", (*layout.path, name), what, "write its range", of_key=True)
+        return separated(fields, separator, self._frame, layout.path, self._report)
 
     def _number(self, layout: Written, direction: Direction, name: str) -> int:
         path, command = layout.number_path, name.partition(".")[0]
@@ -152,7 +176,9 @@ class MessageBuilder:
     def single(self, name: str, spec: MessageSpec) -> Message:
         """A message without a response."""
         path: Path = ("messages", name, "fields")
-        layout = Written(name, StatedId(spec.id), ("messages", name, "id"), spec.fields, path)
+        layout = Written(
+            name, StatedId(spec.id), ("messages", name, "id"), spec.fields, path, (), spec.separator
+        )
         nodes = self._bus.nodes if self.addressed else None
         number = self._number(layout, spec.direction or "message", name)
         message = Message(
@@ -160,7 +186,7 @@ class MessageBuilder:
             command=name,
             direction=spec.direction or "message",
             id=number,
-            fields=self._fields.build(spec.fields, path),
+            fields=self._fields_of(layout),
             doc=spec.doc,
             section=spec.section,
             confirmed=spec.confirmed,
@@ -168,6 +194,7 @@ class MessageBuilder:
             addresses=(nodes,) if nodes else (),
             default_address=nodes[0] if nodes else 0,
             seeds=self._seeds.of(name, number, spec.attributes, ("messages", name)),
+            separator=self._separator(layout),
         )
         self._add(message, layout)
         if isinstance(self._frame, PacketFrame) and spec.direction != "request":
@@ -209,6 +236,8 @@ class MessageBuilder:
         if self._frame is None:
             return
         self._check_size(message, path)
+        if message.separator:
+            check_separator(message, self._frame, path, self._report)
         if message.empty_is_default and any(field.conditional for field in message.fields):
             what = f"{message.name} has fields that may be absent, so an empty one is not all its defaults"
             self._error("bad-condition", (*path[:-1], "empty_request"), what, "remove empty_request")
@@ -265,7 +294,7 @@ class MessageBuilder:
         ):
             return
         for field in message.fields:
-            if is_open(field):
+            if is_open(field) and not message.separator:
                 neither = f"neither the frame nor {message.name} has a length"
                 what = f"the end of {field.name} is unknown: {neither}"
                 hint = "give it a count or a fixed size, or give the frame a length or terminator"
@@ -321,6 +350,8 @@ class MessageBuilder:
             return
         if isinstance(field.type, Blob):
             marked = not field.type.text or marker < 0x80
+        elif isinstance(field.type, Scalar) and field.type.text:
+            marked = marker < 0x80
         else:
             marked = any(chunk.mask & marker for chunk in _chunks(field.type))
         if marked:

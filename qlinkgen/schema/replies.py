@@ -124,7 +124,9 @@ class ReplyBuilder:
             return self._shared[written.name]
         number = written.number.of(self._file.commands[command].id)
         fields = (*written.path, "fields")
-        layout = Written(written.name, number, (*written.path, "id"), written.spec.fields, fields)
+        spec = written.spec
+        number_path = (*written.path, "id")
+        layout = Written(written.name, number, number_path, spec.fields, fields, separator=spec.separator)
         owner = "" if written.shared else command
         message = self._messages.reply(owner, written.spec, layout, addressing=addressing)
         if written.shared:

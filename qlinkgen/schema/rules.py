@@ -81,6 +81,11 @@ _ALL = (
         "Other widths do not fill whole bytes; use bits, or groups whose parts cover each bit once.",
     ),
     Rule(
+        "bad-separator",
+        "A separator divides texts that do not contain it, in a frame whose end is known.",
+        "A receiver finds the end of a field by the separator after it.",
+    ),
+    Rule(
         "bad-digits",
         "A number as text has room for its digits, and a receiver finds its end.",
         "Decimal digits show steps of 1, 1/10, 1/100 and so on exactly, and no others. A text of varying "

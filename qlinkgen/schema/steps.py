@@ -183,7 +183,10 @@ class StepBuilder:
             found = sized(fields, asked.request, step.fields_path, self._report)
             fields, self._sizes[asked.name] = found
         items = {name for name, _ in self._sizes.get(asked.name, ()) if step.last}
-        layout = Written(step.name, number.of(asked.spec.id), place, fields, step.fields_path, items)
+        separator = asked.spec.separator
+        layout = Written(
+            step.name, number.of(asked.spec.id), place, fields, step.fields_path, items, separator
+        )
         direction: Literal["request", "response"] = "request" if sent else "response"
         return self._messages.reply(
             asked.name, step.spec, layout, addressing=asked.addressing, direction=direction

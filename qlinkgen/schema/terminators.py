@@ -81,7 +81,8 @@ def _bytes_of(part: Part, frame: DelimitedFrame, messages: Sequence[Message]) ->
         case "constant" | "terminator":
             return frozenset(part.constant)
         case "payload":
-            return _joined(bytes_in(field) for message in messages for field in message.fields)
+            separators = _joined(frozenset(message.separator) for message in messages)
+            return separators | _joined(bytes_in(field) for message in messages for field in message.fields)
         case "checksum":
             assert part.checksum is not None
             return _joined(frozenset(range(chunk.mask + 1)) for chunk in part.checksum.chunks)
@@ -150,7 +151,7 @@ def bytes_in(field: Field) -> Alphabet:
     kind = field.type
     match kind:
         case Blob():
-            return frozenset(range(0x80)) if kind.text else ALL_BYTES
+            return frozenset(range(0x80)) - {*kind.excluded} if kind.text else ALL_BYTES
         case Array():
             return ALL_BYTES if kind.packed else _bytes_of_number(kind.item)
         case Bits():

@@ -134,8 +134,7 @@ def test_members_in_c() -> None:
          "'as' has no effect on u128; use an integer of up to 64 bits, with a scale such as 1/100"),
         ('{type: u8, as: "decimal[2]", byteorder: little}', "'byteorder' has no effect on text; remove it"),
         ('{type: u8, as: "decimal[2]", offset: 1}',
-         "decimal digits do not show u8 in steps of 1 from 1; use a scale such as 1/100 without an offset, "
-         "with a range"),
+         "decimal digits do not show u8 in steps of 1 from 1; use a scale such as 1/100 without an offset"),
         ('{type: u8, as: "decimal[2]", default: 100}',
          "'100' does not fit 8 unsigned bits; these hold 0..99; use a wider type or another number"),
         ('{type: u8, as: "decimal[6..2]"}',

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from qlinkgen.backends.c.checks import condition, refused_when_received
 from qlinkgen.backends.c.names import Names, storage, unsigned, unsigned_type
+from qlinkgen.backends.c.separated import constant_size
 from qlinkgen.backends.c.sizes import size_terms
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.naming import member
@@ -138,7 +139,11 @@ def _payload_lines(names: Names, own: str, plan: MessagePlan, has_struct: bool) 
     if message.variable:
         size = size_terms(message, "message->")
         if plan.payload.walked:
-            size = f"{names.function(message)}_size_(message)"
+            size = (
+                f"{names.function(message)}_size_(message)"
+                if has_struct
+                else f"{constant_size(plan.payload)}U"
+            )
         lines.append(f"const size_t payload_size = {size};")
         size, fits = "payload_size", f"{own}_fits_(capacity, payload_size)"
     start = f"(int){size}"

@@ -114,6 +114,15 @@ class Layouts:
         """A condition that holds where a text is not a number that the integer can hold."""
         return f"!{self._text_call('is', integer, text, place, size)}"
 
+    def cells(self) -> str:
+        """The prefix of the functions that divide texts at separators."""
+        self._texts.add((0, "get"))
+        return self.prefix
+
+    def has_octet(self, text: str, size: str, octet: int) -> str:
+        """A condition that holds where a text has a byte."""
+        return f"({self.cells()}_text_size_({text}, {size}, {unsigned(octet, 8, hexadecimal=True)}) < {size})"
+
     def _text_call(self, verb: str, integer: AnyInteger, text: Digits, place: str, size: str) -> str:
         self._texts.add((text.base, "get"))
         wire = integer.integer if isinstance(integer, Scalar) else integer

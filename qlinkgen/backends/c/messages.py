@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.backends import c_text
+from qlinkgen.backends.c import separated
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.describe import field_rows, member_note, message_head, record_head
 from qlinkgen.backends.c.encode import Encoder
@@ -181,16 +182,19 @@ class MessageWriter:
             last = each.presence
 
     def _measure(self, payload: PayloadPlan, same: str) -> list[str]:
-        if not payload.walked:
+        if not payload.walked or not payload.settable:
             return []
-        return [f"return {same}_size_(message);"] if same else size_lines(payload)
+        if same:
+            return [f"return {same}_size_(message);"]
+        return separated.size_lines(payload, self._layouts) if payload.separator else size_lines(payload)
 
     def _encode(self, plan: MessagePlan, same: str) -> list[str]:
         own = "message, " if plan.payload.settable else ""
         if same:
             return [f"return {same}_encode({own}payload, capacity);"]
         if plan.payload.walked:
-            encoder = WalkedEncoder(plan.payload, self._layouts, function=self._names.function(plan.message))
+            make = separated.SeparatedEncoder if plan.payload.separator else WalkedEncoder
+            encoder = make(plan.payload, self._layouts, function=self._names.function(plan.message))
             return [*encoder.statements(), "return (int)size;"]
         size = f"{self._names.constant(plan.message)}_MAX_SIZE" if plan.payload.fixed else "size"
         lines = Encoder(plan.payload, self._layouts).statements()
@@ -205,7 +209,8 @@ class MessageWriter:
             return [f"return {same}_decode({own}payload, size);"]
         if plan.payload.walked:
             init = f"{self._names.constant(plan.message)}_INIT"
-            return [*WalkedDecoder(plan.payload, self._layouts, init=init).statements(), ok]
+            make = separated.SeparatedDecoder if plan.payload.separator else WalkedDecoder
+            return [*make(plan.payload, self._layouts, init=init).statements(), ok]
         decoder, empty = Decoder(plan.payload, self._layouts), list[str]()
         if plan.payload.empty_is_default and plan.payload.least > 0:
             empty = ["if (size == 0U) {", *(f"    {line}" for line in [*self._defaults(plan), ok]), "}"]

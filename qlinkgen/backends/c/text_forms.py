@@ -104,7 +104,12 @@ static inline size_t {p}_size_decimal_(size_t least, size_t point, uint64_t valu
         ++size;
     }}
     size = (size > point) ? size : (point + 1U);
-    size += ((point > 0U) ? 1U : 0U) + (negative ? 1U : 0U);
+    if (point > 0U) {{
+        ++size;
+    }}
+    if (negative) {{
+        ++size;
+    }}
     return (size > least) ? size : least;
 }}"""
 
@@ -169,7 +174,29 @@ static inline size_t {p}_size_hex_(size_t least, uint64_t value)
     return (size > least) ? size : least;
 }}"""
 
+_CELLS = """\
+static inline size_t {p}_text_size_(const uint8_t *text, size_t size, uint8_t end)
+{{
+    size_t index = 0U;
+    while ((index < size) && (text[index] != end)) {{
+        ++index;
+    }}
+    return index;
+}}
+
+static inline size_t {p}_texts_(const uint8_t *text, size_t size, uint8_t separator)
+{{
+    size_t number = 1U;
+    for (size_t index = 0U; index < size; ++index) {{
+        if (text[index] == separator) {{
+            ++number;
+        }}
+    }}
+    return number;
+}}"""
+
 _TEXTS = {
+    (0, "get"): _CELLS,
     (10, "get"): _READ_DECIMAL,
     (10, "put"): _PUT_DECIMAL,
     (10, "size"): _SIZE_DECIMAL,
@@ -181,7 +208,11 @@ _TEXTS = {
 
 def text_helpers(prefix: str, needed: Collection[tuple[int, Verb]]) -> list[Helper]:
     """The functions for these bases and verbs."""
-    names = {10: "A decimal number as text", 16: "A hexadecimal number as text"}
+    names = {
+        0: "Texts between separators",
+        10: "A decimal number as text",
+        16: "A hexadecimal number as text",
+    }
     return [
         Helper(names[key[0]], tuple(text.format(p=prefix).splitlines()))
         for key, text in _TEXTS.items()

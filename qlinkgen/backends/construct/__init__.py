@@ -38,7 +38,7 @@ _SUPPORT = {
     "_ended": "Add Cobs Digits EndedFrame Escape Pair",
     "_fasked": "Asked Told",
     "_frecords": "Record",
-    "_ftexts": "TextNumber",
+    "_ftexts": "BetweenField Separated TextNumber",
     "_ftrimmed": "Trimmed",
     "_fwalks": "Walked",
 }

@@ -1,4 +1,4 @@
-"""Numbers as text.
+"""Numbers as text, and messages of texts between separators.
 
 Copied next to the modules that need it, unchanged.
 """
@@ -6,17 +6,27 @@ Copied next to the modules that need it, unchanged.
 from __future__ import annotations
 
 import re
-from typing import BinaryIO
+from collections.abc import Sequence
+from io import BytesIO
+from typing import Any, BinaryIO
 
 from construct import (
+    Bytes,
     Construct,
     Container,
+    Default,
     IntegerError,
+    RangeError,
+    Rebuild,
+    Renamed,
+    StringError,
     ValidationError,
     stream_read,
     stream_read_entire,
     stream_write,
 )
+
+from ._fields import Message, Row, TextField, Values
 
 _DECIMAL = re.compile(rb"[+-]?([0-9]*)\.?([0-9]*)\Z")
 _HEXADECIMAL = re.compile(rb"[0-9A-Fa-f]+\Z")
@@ -86,3 +96,114 @@ class TextNumber(Construct):
 
     def _sizeof(self, context: Container, path: str) -> int:
         return self.most
+
+
+class BetweenField(TextField):
+    """7-bit text without some characters."""
+
+    def __init__(self, minimum: int, maximum: int, excluded: bytes) -> None:
+        super().__init__(minimum, maximum)
+        self.excluded = excluded.decode()
+
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> str:
+        return self._without(str(super()._parse(stream, context, path)), path)
+
+    def _build(self, obj: Row, stream: BinaryIO, context: Container, path: str) -> Row:
+        self._without(str(obj), path)
+        built: Row = super()._build(obj, stream, context, path)
+        return built
+
+    def _without(self, text: str, path: str) -> str:
+        if {*text} & {*self.excluded}:
+            raise StringError(f"{text!r} has one of {self.excluded!r}", path=path)
+        return text
+
+
+class Separated(Message):
+    """A message of texts between separators.
+
+    Those of ``optional``, names and whether they are sent by default, may be absent: empty, or None.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        message_id: int,
+        *fields: Renamed,
+        separator: bytes,
+        optional: Sequence[tuple[str, bool]] = (),
+        **settings: Any,
+    ) -> None:
+        # Any: the settings of a Message.
+        super().__init__(name, message_id, *fields, **settings)
+        self.separator = separator
+        self.optional = {field for field, _ in optional}
+        self.defaults.update({field: None for field, given in optional if not given})
+        needed = [i for i, each in enumerate(fields, 1) if each.name not in self.optional]
+        self.needed = max(needed, default=1)
+        sizes = [_sizes(each) for each in fields]
+        kept = sizes[: self.needed]
+        absent = [each.name in self.optional for each in fields]
+        least = sum(0 if none else low for none, (low, _) in zip(absent, kept, strict=False))
+        self.least = least + self.needed - 1
+        self.most = sum(high for _, high in sizes) + len(sizes) - 1
+
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
+        texts = stream_read_entire(stream, path).split(self.separator)
+        if not self.needed <= len(texts) <= len(self.fields):
+            raise RangeError(f"{len(texts)} texts in {self.name}", path=path)
+        texts += [b""] * (len(self.fields) - len(texts))
+        values = Container()
+        for field, text in zip(self.fields, texts, strict=True):
+            if not text and field.name in self.optional:
+                values[field.name] = None
+                continue
+            least, most = _sizes(field)
+            if not least <= len(text) <= most:
+                raise RangeError(f"{field.name} has {len(text)} characters", path=path)
+            if isinstance(field.subcon, Rebuild):
+                continue
+            found = field.parse(text, number=len(text))
+            if isinstance(field.subcon, Default):
+                values[field.name] = found
+        return values
+
+    def _build(
+        self, obj: Values, stream: BinaryIO, context: Container, path: str
+    ) -> Values:
+        if unknown := sorted(set(obj) - set(self.defaults)):
+            raise ValidationError(
+                f"{self.name} has no field {', '.join(map(str, unknown))}", path=path
+            )
+        values = Container(self.defaults)
+        values.update(obj)
+        texts = [self._text(field, values, path) for field in self.fields]
+        while len(texts) > self.needed and not texts[-1]:
+            texts.pop()
+        data = self.separator.join(texts)
+        stream_write(stream, data, len(data), path)
+        return obj
+
+    def _text(self, field: Renamed, values: Container, path: str) -> bytes:
+        if field.name in self.optional and values[field.name] is None:
+            return b""
+        stream = BytesIO()
+        try:
+            field._build(values.get(field.name), stream, values, path)
+        except TypeError as error:
+            raise ValidationError(
+                f"{self.name} has a value of the wrong type: {error}", path=path
+            ) from None
+        return stream.getvalue()
+
+
+def _sizes(field: Renamed) -> tuple[int, int]:
+    """Minimum and maximum number of characters that are received."""
+    subcon: Any = field  # Any: construct has no type hints.
+    while hasattr(subcon, "subcon"):
+        subcon = subcon.subcon
+    if isinstance(subcon, TextNumber):
+        return subcon.least if subcon.least == subcon.most else 1, subcon.most
+    if isinstance(subcon, Bytes):
+        return subcon.length, subcon.length
+    return subcon.minimum, subcon.maximum

@@ -30,7 +30,7 @@ from qlinkgen.plan.parts import (
     Part,
     PayloadPart,
 )
-from qlinkgen.plan.payload import Member, PayloadPlan
+from qlinkgen.plan.payload import Member, PayloadPlan, Presence
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -91,12 +91,27 @@ def _message(message: MessagePlan, types: Types) -> Call:
         settings["keep"] = message.payload.trim
     if message.message.seeds:
         settings["seeds"] = message.message.seeds
-    if message.payload.walked:
+    if message.payload.separator:
+        settings["separator"] = message.payload.separator
+        if optional := tuple((each.field, each.given) for each in _absent(message.payload)):
+            settings["optional"] = Sequence(optional)
+    elif message.payload.walked:
         settings["presence"] = Sequence(tuple(_presence(message.payload)))
-    name = "Walked" if message.payload.walked else "Message" if message.payload.trim is None else "Trimmed"
+    name = _class_of(message.payload)
     return Call(
         name, (message.name, hexadecimal(message.id), *fields(message, types)), tuple(settings.items())
     )
+
+
+def _class_of(payload: PayloadPlan) -> str:
+    if payload.separator:
+        return "Separated"
+    return "Walked" if payload.walked else "Message" if payload.trim is None else "Trimmed"
+
+
+def _absent(payload: PayloadPlan) -> Iterator[Presence]:
+    """What decides about each text that may be absent."""
+    return (step.presence for step in payload.steps if step.presence)
 
 
 def _presence(payload: PayloadPlan) -> Iterator[Node]:

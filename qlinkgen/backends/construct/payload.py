@@ -223,19 +223,14 @@ class _Field:
             case ConstantStep():
                 return self._named(step, Call("Const", (step.value, integer(step.integer))))
             case ReservedStep():
-                data = Call("Bytes", (step.integer.size,))
-                return self._named(step, Call("Rebuild", (data, step.integer.pack(step.value))))
+                return self._named(step, _reserved(step))
             case CountStep():
                 return self._named(step, _count(step))
             case BitsStep():
                 members = tuple(map(self._member, step.members))
                 return self._named(step, Call("BitFields", (integer(step.integer, signed=False), *members)))
             case BytesStep():
-                kind, default = (
-                    ("TextField", step.default.decode()) if step.text else ("BytesField", step.default)
-                )
-                kind, pad = (f"Padded{kind}", (step.pad,)) if step.pad else (kind, ())
-                return self._run(step, kind, pad, default)
+                return self._octets(step)
             case ItemsStep():
                 kind, item = ("PackedField", _row(step)) if step.packed else ("ArrayField", ())
                 items = Sequence(tuple(_shown(step.number, each) for each in step.default))
@@ -248,6 +243,14 @@ class _Field:
                 return self._run(step, "ArrayField", (Ref(self._types.records[step.record.name]),), empty)
             case _:
                 assert_never(step)
+
+    def _octets(self, step: BytesStep) -> Named:
+        kind, default = ("TextField", step.default.decode()) if step.text else ("BytesField", step.default)
+        if step.excluded:
+            text = Call("BetweenField", (step.length.minimum, step.length.maximum, step.excluded))
+            return self._named(step, Call("Default", (text, default)))
+        kind, pad = (f"Padded{kind}", (step.pad,)) if step.pad else (kind, ())
+        return self._run(step, kind, pad, default)
 
     def _run(self, step: RunStep, kind: str, item: tuple[Node, ...], default: Node) -> Named:
         run = Call(kind, (*item, step.length.minimum, step.length.maximum))
@@ -264,6 +267,12 @@ class _Field:
 
     def _value(self, number: Scalar, raw: Node) -> Node:
         return self._types.value(number, raw)
+
+
+def _reserved(step: ReservedStep) -> Call:
+    if step.integer.text and not step.integer.text.fixed:
+        return Call("Rebuild", (integer(step.integer), step.value))
+    return Call("Rebuild", (Call("Bytes", (step.integer.size,)), step.integer.pack(step.value)))
 
 
 def _count(step: CountStep) -> Call:

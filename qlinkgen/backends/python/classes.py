@@ -16,6 +16,7 @@ from qlinkgen.backends.python.measure import measure_lines
 from qlinkgen.backends.python.names import attribute, class_name, constant_name, natural
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.sections import way_class
+from qlinkgen.backends.python.separated import SeparatedDecoder, SeparatedEncoder
 from qlinkgen.backends.python.walked import WalkedDecoder, WalkedEncoder
 from qlinkgen.model.fields import Layout, Value
 from qlinkgen.model.frame import ATTRIBUTE
@@ -178,8 +179,7 @@ class ClassBuilder:
     def _with_codec(self, message: MessagePlan, head: ClassModel, title: str, number: str) -> ClassModel:
         """A class with its code; ``title`` is a part of the names of its constants, ``number`` is its id."""
         scales = self._scales_of(message)
-        walked = message.payload.walked
-        make_encoder, make_decoder = (WalkedEncoder, WalkedDecoder) if walked else (Encoder, Decoder)
+        make_encoder, make_decoder = _makers(message.payload)
         place = self._within(message)
         encoder = make_encoder(message, place, title, number, scales)
         decoder = make_decoder(message, place, title, scales)
@@ -301,6 +301,13 @@ class ClassBuilder:
             text = values.description(value, settable[value.name], self._place)
             lines += docstrings.item(f"{attribute(value.name)}: {text}", WIDTH - 4)
         return lines
+
+
+def _makers(payload: PayloadPlan) -> tuple[type[Encoder], type[Decoder]]:
+    """What collects the code of a message."""
+    if payload.separator:
+        return SeparatedEncoder, SeparatedDecoder
+    return (WalkedEncoder, WalkedDecoder) if payload.walked else (Encoder, Decoder)
 
 
 def _message_of(layout: Layout) -> MessagePlan:

@@ -207,9 +207,7 @@ def _plain_rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Ca
         case BitsStep():
             return [rule for member in step.members for rule in _member_rules(member, place, scales)]
         case BytesStep():
-            kind = "TextRule" if step.text else "BytesRule"
-            rule = _rule(place, kind, name, step.least, step.length.maximum)
-            return [Call(place.use("PaddedRule"), [rule.flat, literal(step.pad)]) if step.pad else rule]
+            return [_octets_rule(step, place)]
         case ItemsStep():
             length, item = step.length, step.number
             if not _is_whole(item):
@@ -223,6 +221,14 @@ def _plain_rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Ca
             return [_record_rule(step, place)]
         case _:
             assert_never(step)
+
+
+def _octets_rule(step: BytesStep, place: Place) -> Call:
+    name, sizes = attribute(step.name), (step.least, step.length.maximum)
+    if step.excluded:
+        return _rule(place, "BetweenRule", name, *sizes, literal(step.excluded))
+    rule = _rule(place, "TextRule" if step.text else "BytesRule", name, *sizes)
+    return Call(place.use("PaddedRule"), [rule.flat, literal(step.pad)]) if step.pad else rule
 
 
 def _record_rule(step: RecordStep | RecordsStep, place: Place) -> Call:

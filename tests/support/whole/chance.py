@@ -40,10 +40,17 @@ def values(message: Message, rng: random.Random, mark: int) -> dict[str, Raw]:
     for slot in message.slots:
         sent = holds(slot, {name: raw for name, raw in found.items() if isinstance(raw, int)})
         if slot.optional:
-            left_out = left_out or rng.random() < 0.3
+            left_out = (left_out and not message.separator) or rng.random() < 0.3
             sent = not left_out
         found |= {name: _value(kind, rng, mark) if sent else None for name, kind in slot.values()}
-    return found
+    return {name: _between(raw, message.barred) for name, raw in found.items()}
+
+
+def _between(raw: Raw, barred: bytes) -> Raw:
+    """A text without the bytes that it does not have."""
+    return (
+        bytes(0x7E if each in barred else each for each in raw) if barred and isinstance(raw, bytes) else raw
+    )
 
 
 def _value(kind: Value, rng: random.Random, mark: int) -> Raw:
@@ -130,7 +137,7 @@ def fits(reference: Reference, payload: bytes) -> bool:
 
 def _spoilt(data: bytes, rng: random.Random) -> bytes:
     spoilt, at = bytearray(data), rng.randrange(len(data) + 1)
-    noise = rng.choice((rng.randrange(256), 0, 0xFF, 0x80, 1))
+    noise = rng.choice((rng.randrange(256), 0, 0xFF, 0x80, 1, rng.choice(b"+-.,;0af")))
     action = rng.choice(("change", "change", "lose", "add"))
     if action == "add" or not data:
         spoilt.insert(at, noise)

@@ -176,6 +176,31 @@ class FieldMaker:
         self._name_sizes(made)
         return dict(self._dated(made, taken))
 
+    def texts(self, room: Room) -> Doc:
+        """The fields of a message between separators; any may be empty that is optional."""
+        rng, taken = self.rng, {self.shape.address_name}
+        made: Doc = {}
+        for _ in range(rng.choice((1, 2, 3, 5))):
+            if rng.random() < 0.3:
+                low = rng.choice((0, 1, 1, 3))
+                spec: Doc = {"type": f"text[{low}..{max(1, low + rng.choice((0, 2, 6)))}]"}
+                size, optional = int(spec["type"].partition("..")[2][:-1]), low > 0
+                if rng.random() < 0.3 and size > low:
+                    spec["default"] = "#" * size
+            else:
+                spec, size = self._text_number()
+                optional = not {"const", "reserved"} & spec.keys()
+                if rng.random() < 0.6:
+                    name, _, size_text = spec["as"].rstrip("]").partition("[")
+                    least = rng.randint(1, int(size_text))
+                    spec["as"] = rng.choice((f"{name}[{least}..{size_text}]", f"{name}[1..{size_text}]"))
+            if optional and rng.random() < 0.5:
+                spec["optional"] = True
+            if size < room.left:
+                made[self.words.name(taken)] = spec
+                room.left -= size + 1
+        return made
+
     def _dated(self, made: list[tuple[str, Any]], taken: set[str]) -> list[tuple[str, Any]]:
         """Some fields begin with a version of the protocol, and others have ended before the newest one."""
         rng = self.rng

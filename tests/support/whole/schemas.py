@@ -178,14 +178,19 @@ class _Maker:
             )
             addressing = command["addressing"] = rng.choice(most)
         silent = addressing == "broadcast" or (addressing != "answered_broadcast" and rng.random() < 0.2)
-        request = maker.fields(Room.of(shape))
-        response = "none" if silent else self._response(shape, maker, request)
+        if self._separable(shape) and rng.random() < 0.15:
+            command["separator"] = rng.choice((",", ";", " ", "\t"))
+            request = maker.texts(Room.of(shape))
+            response = "none" if silent else maker.texts(Room.of(shape))
+        else:
+            request = maker.fields(Room.of(shape))
+            response = "none" if silent else self._response(shape, maker, request)
         command |= {"request": request, "response": response, "repeat": rng.choice(("safe", "unsafe"))}
         counters = [name for name, spec in request.items() if spec in ("u8", "u16")]
         if counters and rng.random() < 0.4:
             command["repeat"] = {"counter": rng.choice(counters)}
         absent = any(isinstance(spec, dict) and {"if", "optional"} & spec.keys() for spec in request.values())
-        distinct = shape.has_length and not shape.trimmed and not absent
+        distinct = "separator" not in command and shape.has_length and not shape.trimmed and not absent
         if distinct and request and not shape.least and rng.random() < 0.15:
             command["empty_request"] = "defaults"
         if rng.random() < 0.2:
@@ -407,7 +412,14 @@ class _Maker:
             direction = direction or "request"
         if direction and kinds != "undirected":
             message["direction"] = direction
+        if self._separable(shape) and self.rng.random() < 0.3:
+            return self._described(message | {"separator": ",", "fields": maker.texts(Room.of(shape))})
         return self._described(message | {"fields": maker.fields(Room.of(shape))})
+
+    def _separable(self, shape: Shape) -> bool:
+        """Whether the frame allows texts between separators."""
+        varies = shape.has_length and not shape.trimmed and not shape.least and shape.word <= 1
+        return varies and shape.kind not in ("marked", "packet") and not shape.groups
 
     def _described(self, spec: Doc) -> Doc:
         if self.rng.random() < 0.6:

@@ -289,6 +289,9 @@ class Message:
     beside: tuple[tuple[str, Number], ...] = ()
     #: Zeros at the end of its payload are not sent after so many bytes; None: all are sent.
     trim: int | None = None
+    #: The byte between texts, and the bytes that a text does not have.
+    separator: bytes = b""
+    barred: bytes = b""
 
     def values(self) -> Iterator[tuple[str, Value]]:
         """Values in wire order, those of the frame first."""
@@ -734,6 +737,40 @@ def seeds(document: Doc, message: str) -> Mapping[str, bytes]:
 
 def messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, ...]:
     """All messages of a file, in order."""
+    return tuple(_with_separator(each, document) for each in _messages(document, fields, addressed))
+
+
+def _with_separator(message: Message, document: Doc) -> Message:
+    name, _, reply = message.name.partition(".")
+    usual = document.get("defaults", {}).get("separator")
+    places = [document.get("messages", {}).get(name), document.get("commands", {}).get(name)]
+    if reply not in ("", "request", "response"):
+        own = document["commands"][name].get("replies", {})
+        places = [own.get(reply) or document["replies"][reply]]
+    elif not any(places):
+        places = [document["replies"][name]]
+    spec = next(each for each in places if each)
+    chosen = spec.get("separator", usual)
+    if chosen in (None, "none") or not message.slots:
+        return message
+    ends = [each for each in document["frame"]["parts"].values() if isinstance(each, dict)]
+    ends = [each for each in ends if each.get("role") == "terminator"]
+    end = b"".join(octets(each["value"]) for each in ends)
+    barred = chosen.encode() + end
+    slots = tuple(_filled(slot, barred) for slot in message.slots)
+    return replace(message, slots=slots, separator=chosen.encode(), barred=barred)
+
+
+def _filled(slot: Slot, barred: bytes) -> Slot:
+    """A text that needs a value, which is made up of a legal character."""
+    kind = slot.kind
+    if not isinstance(kind, Run) or kind.default != (ord(" "),) * kind.low:
+        return slot
+    fill = next(each for each in b" 0x_" if each not in barred)
+    return replace(slot, kind=replace(kind, default=(fill,) * kind.low))
+
+
+def _messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, ...]:
     found: list[Message] = []
     for name, spec in document.get("commands", {}).items():
         defaults = document.get("defaults", {})

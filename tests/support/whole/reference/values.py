@@ -73,10 +73,56 @@ def _default_record(kind: Record) -> dict[str, Raw]:
 
 def encode(message: Message, values: Mapping[str, Raw]) -> bytes:
     """The payload of a message."""
+    if message.separator:
+        return _texts(message, values)
     data = _fields(message.slots, values)
     while message.trim is not None and len(data) > message.trim and data[-1] == 0:
         data = data[:-1]
     return data
+
+
+def _texts(message: Message, values: Mapping[str, Raw]) -> bytes:
+    """The texts of the fields; absent ones at the end are left out."""
+    data, seen = b"", False
+    for index in reversed(range(len(message.slots))):
+        slot = message.slots[index]
+        if slot.optional and values[slot.name] is None:
+            text = b""
+        else:
+            text = _encoded(message.slots, slot, values)
+            seen = True
+            if isinstance(slot.kind, Run) and any(each in message.barred for each in text):
+                raise Wrong("range", slot.name)
+        if seen:
+            data = (message.separator if index else b"") + text + data
+    return data
+
+
+def _between(message: Message, payload: bytes) -> dict[str, Raw]:
+    """The values of texts between separators."""
+    texts = payload.split(message.separator)
+    needed = [index for index, slot in enumerate(message.slots) if not slot.optional]
+    if not max(needed, default=0) < len(texts) <= len(message.slots):
+        raise Wrong("length", f"{len(texts)} texts")
+    values: dict[str, Raw] = {}
+    for index, slot in enumerate(message.slots):
+        text, kind = texts[index] if index < len(texts) else b"", slot.kind
+        if slot.optional and not text:
+            values[slot.name] = None
+            continue
+        if isinstance(kind, Run):
+            least, most = kind.low, kind.most
+        else:
+            assert isinstance(kind, Number)
+            assert kind.text
+            _, least, most, _, _ = kind.text
+            least = least if least == most else 1
+        if not least <= len(text) <= most:
+            raise Wrong("length", slot.name)
+        values |= _decoded(slot, text, len(text))
+        if isinstance(kind, Run) and any(each in message.barred for each in text):
+            raise Wrong("range", slot.name)
+    return values
 
 
 def _fields(slots: Sequence[Slot], values: Mapping[str, Raw]) -> bytes:
@@ -196,6 +242,8 @@ def decode(message: Message, payload: bytes) -> dict[str, Raw]:
     """The values of a payload. Raises Wrong, for wrong lengths before values out of range."""
     if not payload and message.empty_is_default:
         return {name: default(kind) for name, kind in message.values() if (name, kind) not in message.beside}
+    if message.separator:
+        return _between(message, payload)
     if message.walked:
         return _walked(message, payload)
     values: dict[str, Raw] = {}
@@ -274,7 +322,7 @@ def _decoded(slot: Slot, data: bytes, number: int | None) -> dict[str, Raw]:
         return {slot.name: _decoded_run(kind, data, kind.most if number is None else number)}
     if slot.role == "reserved":
         return {}
-    if stray(kind.pieces, data):
+    if not (isinstance(kind, Number) and kind.text) and stray(kind.pieces, data):
         raise Wrong("range", slot.name)
     if isinstance(kind, Packed):
         whole = get(kind.pieces, data)

@@ -1,0 +1,79 @@
+"""Second pass, separators: checks the fields of a message that a separator divides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from qlinkgen.model.fields import Field
+from qlinkgen.model.frame import DelimitedFrame, Frame
+from qlinkgen.model.message import Message
+from qlinkgen.model.types import Blob, Scalar
+from qlinkgen.schema.notation import shown
+from qlinkgen.schema.report import Reporter
+from qlinkgen.schema.source import Path
+
+_RULE = "bad-separator"
+
+
+def separated(
+    fields: Sequence[Field], separator: bytes, frame: Frame | None, path: Path, report: Reporter
+) -> tuple[Field, ...]:
+    """The fields between separators; their texts have neither the separator nor the end of the frame."""
+    excluded = separator
+    if isinstance(frame, DelimitedFrame):
+        end = frame.part("terminator")
+        excluded += end.constant if end else b""
+    barred = bytes(sorted(each for each in {*excluded} if each < 0x80))
+    return tuple(_checked(field, separator, barred, (*path, field.name), report) for field in fields)
+
+
+def check_separator(message: Message, frame: Frame, path: Path, report: Reporter) -> None:
+    """Check what a frame around texts of varying size needs."""
+    place = (*path[:-1], "separator")
+
+    def error(what: str, hint: str) -> None:
+        report.error(_RULE, place, what, hint, needs=(path, ("frame",)))
+
+    if not isinstance(frame, DelimitedFrame):
+        error(
+            f"the frame of {message.name} has no fields of varying size", "use a frame of parts, or remove it"
+        )
+        return
+    end = frame.part("terminator")
+    if end is None and frame.part("length") is None:
+        error(
+            f"neither the frame nor {message.name} tells where its last field ends",
+            "give the frame a length or a terminator",
+        )
+    if end is not None and message.separator in end.constant:
+        error("the separator ends the frame", "use another separator, or another terminator")
+    if frame.payload.trim is not None:
+        error("a payload of texts has no zeros at its end", "remove trim from the payload")
+    if frame.length_scale > 1:
+        error(f"the length counts in steps of {frame.length_scale} bytes", "use a length in bytes")
+    if message.empty_is_default:
+        error(f"an empty {message.name} is one of empty fields, not its defaults", "remove empty_request")
+
+
+def _checked(field: Field, separator: bytes, excluded: bytes, path: Path, report: Reporter) -> Field:
+    kind = field.type
+    if isinstance(kind, Blob) and kind.text and not kind.pad:
+        if field.optional and not kind.length.minimum:
+            what = f"an empty {field.name} is the same as an absent one"
+            report.error(_RULE, (*path, "optional"), what, "remove optional, or write [1..N]", of_key=True)
+        if kind.required:  # only vectors have it as a value
+            fill = next(each for each in b" 0x_" if each not in excluded)
+            kind = replace(kind, default=bytes((fill,)) * kind.length.minimum)
+        if {*kind.default} & {*excluded}:
+            what = f"the default of {field.name} contains the separator, or the end of the frame"
+            report.error(_RULE, (*path, "default"), what, "use other characters", of_key=True)
+        return replace(field, type=replace(kind, excluded=excluded))
+    elif not isinstance(kind, Scalar) or kind.text is None:
+        what = f"{field.name} is not a text, so it may contain the separator"
+        hint = "use text, or a number with as: decimal or as: hex"
+        report.error(_RULE, path, what, hint, of_key=True)
+    elif separator[0] in kind.text.alphabet:
+        what = f"the separator {shown(separator.decode())} may occur in the number {field.name}"
+        report.error(_RULE, path, what, "use another separator", of_key=True)
+    return field

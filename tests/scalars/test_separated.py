@@ -1,0 +1,169 @@
+"""Texts between separators: numbers of any width, absent fields, and what a text does not have."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from construct import ConstructError
+
+from qlinkgen.backends import c, construct, python
+from qlinkgen.backends.base import Options
+from qlinkgen.errors import Fault
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.content import BadContent, pack, unpack
+from qlinkgen.schema import loads
+
+_SCHEMA = """\
+qlinkgen: 1
+protocol: {{name: probe, revision: "1", source: this test}}
+frame:
+  parts:
+    start: {{text: "$"}}
+    code: {{role: message, type: "text[3]"}}
+    comma: {{text: ","}}
+    data: {{role: payload, size: 0..80}}
+    end: {{role: terminator, value: 0D 0A}}
+bus: {{kind: master_slave}}
+defaults: {{repeat: safe, separator: ","}}
+messages:
+  put:
+    id: PUT
+    {more}
+    fields:
+{fields}
+"""
+FIELDS = """
+      depth: {type: i32, as: decimal, scale: 1/10}
+      time: {type: u32, as: "decimal[9..10]", scale: 1/100, optional: true}
+      kind: {type: u8, as: decimal, const: 7}
+      name: "text[0..8]"
+      code: {type: u16, as: "hex[1..4]", optional: true}
+      note: {type: "text[1..5]", optional: true}
+"""
+FULL = {"depth": -7.6, "time": 1.5, "name": "abc", "code": 0xBE, "note": "hi"}
+LEAST = {"depth": 0.0, "time": None, "name": "", "code": None, "note": None}
+
+
+def loaded(fields: str = FIELDS, more: str = "{}") -> tuple[Protocol | None, list[Fault]]:
+    """A protocol around the fields of a message; ``more`` are further keys of it."""
+    text = _SCHEMA.format(fields=fields, more="doc: D." if more == "{}" else more)
+    return loads(text, "probe.yaml")
+
+
+@pytest.fixture(scope="module")
+def protocol() -> Protocol:
+    found, faults = loaded()
+    assert found, [str(fault) for fault in faults]
+    return found
+
+
+@pytest.fixture(scope="module")
+def codec(protocol: Protocol) -> Any:
+    return python.load(protocol)
+
+
+@pytest.mark.parametrize(
+    ("values", "payload"),
+    [
+        (FULL, b"-7.6,000001.50,7,abc,BE,hi"),
+        (LEAST, b"0.0,,7,"),
+        (LEAST | {"code": 0}, b"0.0,,7,,0"),
+        (LEAST | {"note": "x"}, b"0.0,,7,,,x"),
+    ],
+)
+def test_payloads(protocol: Protocol, codec: Any, values: dict[str, Any], payload: bytes) -> None:
+    live = construct.live(protocol)
+    frame = b"$PUT," + payload + b"\r\n"
+    assert codec.Put(**values).to_frame() == frame
+    assert live.payload("put", values) == payload
+    found, parsed = codec.decode(frame), live.messages["put"].parse(payload)
+    assert {name: getattr(found, name) for name in values} == values
+    assert {name: parsed[name] for name in values} == values
+    plan = plan_of(protocol).message("put").payload
+    assert pack(plan, unpack(plan, payload)) == payload
+    assert plan.least == len(b"0,,7,")
+
+
+@pytest.mark.parametrize("payload", [b"+07.60,1.5,07,abc,0be,hi", b"0,,7,,,", b"0.,,7,", b"-.0,,007,,"])
+def test_other_payloads_of_the_same_values(protocol: Protocol, codec: Any, payload: bytes) -> None:
+    plan = plan_of(protocol).message("put").payload
+    raw = unpack(plan, payload)
+    found = codec.decode(b"$PUT," + payload + b"\r\n")
+    assert found.to_frame() == b"$PUT," + pack(plan, raw) + b"\r\n"
+    construct.live(protocol).messages["put"].parse(payload)
+
+
+@pytest.mark.parametrize(
+    ("payload", "kind", "field"),
+    [
+        (b"", "length", ""),
+        (b"0.0,,7", "length", ""),
+        (b"0.0,,7,a,0,b,", "length", ""),
+        (b",,7,", "length", "depth"),
+        (b"0.0,,,", "length", "kind"),
+        (b"0.0,,7,123456789", "length", "name"),
+        (b"0.0,00000001.50,7,", "length", "time"),
+        (b"0.05,,7,", "range", "depth"),
+        (b"0.0,,8,", "range", "kind"),
+        (b"0.0,,7,\x80", "range", "name"),
+        (b"0.0,,7,a\r", "range", "name"),
+        (b"0.0,,7,,x", "range", "code"),
+    ],
+)
+def test_wrong_payloads(protocol: Protocol, codec: Any, payload: bytes, kind: str, field: str) -> None:
+    with pytest.raises(BadContent) as refused:
+        unpack(plan_of(protocol).message("put").payload, payload)
+    assert (refused.value.kind, refused.value.field) == (kind, field)
+    with pytest.raises(codec.DecodeError) as caught:
+        codec.decode(b"$PUT," + payload + b"\r\n")
+    assert caught.value.kind == kind
+    if kind == "range":
+        assert (caught.value.field, caught.value.offset) == (field, refused.value.offset)
+    with pytest.raises(ConstructError):
+        construct.live(protocol).messages["put"].parse(payload)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("depth", 1e9), ("name", "a,b"), ("name", "a\r"), ("note", ""), ("note", "toolong"), ("time", 1e9)],
+)
+def test_what_cannot_be_sent(protocol: Protocol, codec: Any, field: str, value: object) -> None:
+    with pytest.raises(codec.EncodeError) as caught:
+        codec.Put(**FULL | {field: value}).to_frame()
+    assert caught.value.field == field
+    with pytest.raises(ConstructError):
+        construct.live(protocol).payload("put", FULL | {field: value})
+
+
+def test_c_counts_texts_first(protocol: Protocol) -> None:
+    (header,) = c.generate(protocol, Options()).values()
+    assert "if ((texts < 4U) || (texts > 6U)) {" in header
+
+
+@pytest.mark.parametrize(
+    ("fields", "more", "text"),
+    [
+        ("      a: {type: u16, as: decimal}", "separator: none",
+         "the text of a has 1 to 5 characters; use a constant number, as: decimal[5], or a separator"),
+        ("      a: {type: u16, as: decimal}", 'separator: "."',
+         "the separator '.' may occur in the number a; use another separator"),
+        ("      a: u16", "separator: ';'", "a is not a text, so it may contain the separator"),
+        ('      a: {type: "text[0..3]", optional: true}', "separator: ';'",
+         "an empty a is the same as an absent one; remove optional, or write [1..N]"),
+        ('      a: "text[3]"', 'separator: "\\r"',
+         "the separator ends the frame; use another separator, or another terminator"),
+    ],
+)  # fmt: skip
+def test_faults(fields: str, more: str, text: str) -> None:
+    found = [f"{fault.message}; {fault.hint}" for fault in loaded(fields, more)[1]]
+    assert any(each.startswith(text) for each in found)
+
+
+def test_a_text_without_a_bound_takes_what_the_others_leave() -> None:
+    protocol, faults = loaded('      a: {type: u8, as: decimal}\n      b: text\n      c: "text[2]"')
+    assert protocol, [str(fault) for fault in faults]
+    message = protocol.by_name["put"]
+    assert message.max_size == 80
+    assert message.fields[1].max_size == 80 - 3 - 2 - 2
