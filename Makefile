@@ -67,7 +67,8 @@ generate: .venv/.user  ## Rewrite generated/ from schemas/
 	@$(BIN)/qlinkgen generate
 
 bench: .venv/.user  ## Measure the generated code beside its peers
-	@$(PIP) '.[bench]'
+	@$(PIP) '.[bench,library-tests]'
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps $(CRSF)
 	@$(BIN)/python benchmarks/run.py
 
 soak: .venv/.user  ## A million transactions on a bad line, 50 000 over a pty, 20 000 with each firmware; writes docs/soak.md (40 minutes)

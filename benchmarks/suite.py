@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks import c_codec, generator, host, imports, python_codec, ring, stream, wire
+from benchmarks import c_codec, generator, host, imports, library, python_codec, ring, stream, wire
 from benchmarks.report import Section, page, section_text
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmarks.md"
@@ -19,6 +19,7 @@ PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmarks.md"
 SECTIONS: dict[str, tuple[Callable[[int], Section], int, int]] = {
     "python": (python_codec.section, 2000, 60),
     "stream": (stream.section, 1500, 60),
+    "library": (library.section, 600, 30),
     "c": (c_codec.section, 1000, 50),
     "imports": (imports.section, 41, 7),
     "generator": (generator.section, 4, 1),

@@ -6,6 +6,7 @@ Copied next to those that have one.
 from __future__ import annotations
 
 from binascii import crc_hqx
+from struct import Struct
 
 from ._support import DecodeError
 
@@ -142,6 +143,8 @@ def crc(
     """A CRC with the parameters of the catalogue."""
     if (width, poly, refin, refout, xorout) == (16, 0x1021, False, False, 0):
         return Checksum(name, crc_hqx, init)  # in the standard library, 20 times faster
+    if (width, poly, refin, refout) == (16, 0x1021, True, True):
+        return Checksum(name, _mirrored_crc(xorout), init)
     if refin:
         return Checksum(
             name, _reflected_crc(width, poly, refout, xorout), _reflect(init, width)
@@ -156,11 +159,26 @@ def crc(
     )
 
 
+def _mirrored_crc(xorout: int) -> Crc:
+    """The function of the standard library for mirrored bytes; its register is mirrored, too."""
+    mirror = bytes(_reflect(byte, 8) for byte in range(256))
+
+    def compute(data: bytes, register: int) -> int:
+        crc = crc_hqx(bytes(data).translate(mirror), register)
+        return (mirror[crc & 0xFF] << 8 | mirror[crc >> 8]) ^ xorout
+
+    return compute
+
+
 def _plain_crc(width: int, poly: int, spare: int, refout: bool, xorout: int) -> Crc:
     mask, shift, high = (1 << width) - 1, width - 8, 1 << (width - 1)
     table = _table(
         high, lambda value: (value << 1 ^ (poly if value & high else 0)) & mask
     )
+    if width == 16:
+        earlier = [(each << 8 & mask) ^ table[each >> 8] for each in table]
+        pairs = [first ^ last for first in earlier for last in table]
+        return _wide_crc(">H", pairs, refout, xorout)
 
     def compute(data: bytes, register: int) -> int:
         for byte in data:
@@ -176,11 +194,38 @@ def _reflected_crc(width: int, poly: int, refout: bool, xorout: int) -> Crc:
     table = _table(
         1, lambda value: value >> 1 ^ (feedback if value & 1 else 0), up=False
     )
+    if width == 16:
+        earlier = [each >> 8 ^ table[each & 0xFF] for each in table]
+        pairs = [first ^ last for last in table for first in earlier]
+        return _wide_crc("<H", pairs, not refout, xorout)
 
     def compute(data: bytes, register: int) -> int:
         for byte in data:
             register = register >> 8 ^ table[(register ^ byte) & 0xFF]
         return (register if refout else _reflect(register, width)) ^ xorout
+
+    return compute
+
+
+def _wide_crc(order: str, pairs: list[int], mirrored: bool, xorout: int) -> Crc:
+    """A CRC of 16 bits from the changes by every pair of bytes, twice as fast as from single bytes."""
+    unpack = Struct(order).iter_unpack
+    high = order == ">H"
+
+    def compute(data: bytes, register: int) -> int:
+        if len(data) & 1:
+            # Zeros would precede the pair: only the half of the register that meets the byte changes.
+            first = data[0]
+            register = (
+                (register << 8 & 0xFF00) ^ pairs[register >> 8 ^ first]
+                if high
+                else register >> 8 ^ pairs[(register ^ first) << 8 & 0xFF00]
+            )
+            data = data[1:]
+        pair: int
+        for (pair,) in unpack(data):
+            register = pairs[register ^ pair]
+        return (_reflect(register, 16) if mirrored else register) ^ xorout
 
     return compute
 

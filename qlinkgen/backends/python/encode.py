@@ -8,6 +8,7 @@ from typing import assert_never
 from qlinkgen.backends.python import floats, integers, pieces
 from qlinkgen.backends.python.layout import (
     bare,
+    in_hex,
     literal,
     wrapped,
 )
@@ -148,9 +149,13 @@ class Encoder:
                 plain = integers.letter(part.integer, self.place.byteorder)
                 self._integer(part.integer, number if plain else f"({number})")
             case IdPart():
-                self._integer(part.integer, self.number)
+                self._id(part)
             case AddressPart():
                 self._integer(part.integer, self._addressed())
+            case CellPart(slots=(Member() as value,)) if self._alone(part, value):
+                source = f"self.{attribute(value.name)}"  # struct checks type and range
+                self._require(source, *value.conditions)
+                self._integer(part.integer, source)
             case CellPart() | EqualPart():
                 self._lines.append(f"{part.name}_part = {bare(self._part_number(part))}")
                 self._integer(part.integer, f"{part.name}_part")
@@ -158,6 +163,22 @@ class Encoder:
                 raise AssertionError(f"{part.name} is not packed by a message's class")
             case _:
                 assert_never(part)
+
+    def _id(self, part: IdPart) -> None:
+        if self.number == in_hex(self.message.id) and not integers.letter(part.integer, self.place.byteorder):
+            self._add(f"{part.size}s", literal(part.integer.pack(self.message.id)))
+        else:
+            self._integer(part.integer, self.number)
+
+    def _alone(self, part: CellPart, value: Member) -> bool:
+        """Whether a part holds nothing but a number that struct can pack, and nothing is derived from it."""
+        followers = (each for each in (*self.place.front, *self.place.back) if isinstance(each, EqualPart))
+        return (
+            bool(integers.letter(part.integer, self.place.byteorder))
+            and (value.shift, value.bits) == (0, part.integer.bits)
+            and not (value.number.signed or value.number.scaling or isinstance(value.number.meaning, Float))
+            and all(each.of is not part for each in followers)
+        )
 
     def _size(self, part: LengthPart) -> str:
         """What a length counts, in bytes."""

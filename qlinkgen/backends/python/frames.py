@@ -132,16 +132,23 @@ class HeadCheck:
 
     Attributes:
         fault: "number", "address" or "constant" if only a decoder of one whole frame reports it.
+        whole: the condition for a whole header, "" if decoding its message finds the same.
     """
 
     test: str
     found: str
     fault: str = ""
+    whole: str = ""
 
 
 @dataclass(frozen=True)
 class LengthView:
-    """The length of a frame: bounds, offsets, its value in ``head`` and the bytes of ``number``."""
+    """The length of a frame: bounds, offsets, its value in ``head`` and the bytes of ``number``.
+
+    Attributes:
+        quick: the same value; raises an IndexError if the header is too short.
+        bounded: its part holds numbers beyond the bounds.
+    """
 
     bias: int
     least: int
@@ -149,8 +156,10 @@ class LengthView:
     start: int
     end: int
     value: str
+    quick: str
     bytes: str
     scale: int
+    bounded: bool
 
 
 @dataclass(frozen=True)
@@ -213,6 +222,8 @@ class PlacedCheck:
         seeded: it covers attributes of the message.
         main: another algorithm can replace it.
         early: it is verified before the payload.
+        result: statement that computes the value of a whole frame with `message` and `checksum`.
+        wrong: condition for another value in the frame.
     """
 
     name: str
@@ -225,6 +236,8 @@ class PlacedCheck:
     seeded: bool
     main: bool
     early: bool
+    result: str
+    wrong: str
 
 
 @dataclass(frozen=True)
@@ -243,14 +256,14 @@ class PartsView:
         checks: the check values in wire order.
         filling: the same in the order in which they are computed.
         seeds: attributes of message classes that check values cover.
-        blank: size of the check value at the end of the frame, 0 if something else is there.
+        blank: the zeros of the check value at the end of the frame, "" if something else is there.
         trim: bytes of a payload that are sent even if they are zeros at its end, None if all are.
     """
 
     title: str
     checks: Sequence[PlacedCheck]
     filling: Sequence[PlacedCheck]
-    blank: int
+    blank: str
     trim: int | None
     seeds: Sequence[str]
     blocks: BlocksView | None
@@ -269,6 +282,7 @@ class PartsView:
     blank_trailer: str
     id_start: str
     id_of: str
+    id_of_frame: str
     address_of: str
     bare: bool
     verified: bool
@@ -288,6 +302,18 @@ class PartsView:
     def check(self) -> CheckView | None:
         """The algorithm of the main check value, None if there is none."""
         return self.main.view if self.main else None
+
+    @property
+    def quick(self) -> bool:
+        """Whether a whole frame can be cut out at once: its end and its bytes are not coded."""
+        return not (self.ended or self.blocks or (self.stuffing and self.stuffing.whole))
+
+    @property
+    def announced(self) -> bool:
+        """Whether a whole header with the right constants and length makes the decoder wait for its frame."""
+        early = any(each.early for each in self.checks)
+        others = any(each.fault and not each.whole for each in self.head_checks)
+        return self.quick and self.length is not None and not early and not others
 
     @property
     def no_frame(self) -> Sequence[HeadCheck]:
@@ -571,7 +597,7 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         blocks=BlocksView(envelope.blocks.every, _check_view(envelope.blocks.check, "_BLOCKS"))
         if envelope.blocks
         else None,
-        blank=last.size if isinstance(last, CheckPart) else 0,
+        blank=literal(bytes(last.size)) if isinstance(last, CheckPart) else "",
         trim=envelope.payload.trim,
         seeds=sorted({seed_name(seed) for part in envelope.checks for seed in envelope.seeds(part)}),
         address=address,
@@ -591,6 +617,7 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         blank_trailer=_blank_trailer(envelope, address),
         id_start=_id_start(envelope),
         id_of=pieces.number(envelope, envelope.id, "head"),
+        id_of_frame=_quick_id(envelope),
         address_of=pieces.number(envelope, envelope.address, "head") if _leads(envelope) else "",
         bare=receiver.bare,
         verified=receiver.verified,
@@ -707,9 +734,26 @@ def _length_view(plan: Plan, envelope: Envelope) -> LengthView | None:
         start=start,
         end=start + part.size,
         value=pieces.read(envelope, part, "head") + (f" * {part.scale}" if part.scale > 1 else ""),
+        quick=_quick_length(part, start),
         bytes=integers.to_bytes(part.integer, "number"),
         scale=part.scale,
+        bounded=(part.least, part.most) != (0, part.integer.mask),
     )
+
+
+def _quick_length(part: LengthPart, start: int) -> str:
+    read = integers.read_bytewise(part.integer, "head", start)
+    if part.scale == 1:
+        return read
+    return f"({read}) * {part.scale}" if "|" in read else f"{read} * {part.scale}"
+
+
+def _quick_id(envelope: Envelope) -> str:
+    """The message number in a whole frame."""
+    bits = envelope.id[0] if len(envelope.id) == 1 else None
+    if bits and bits.whole and not bits.at and bits.part in envelope.front:
+        return integers.read_bytewise(bits.part.integer, "frame", envelope.offset(bits.part))
+    return pieces.number(envelope, envelope.id, "frame")
 
 
 def _stuffing(plan: Plan) -> StuffingView | None:
@@ -734,8 +778,9 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
         start, end = envelope.offset(part), envelope.offset(part) + part.size
         match part:
             case ConstantPart():
+                test = f"not {literal(part.data)}.startswith(head[{start}:{end}])"
                 yield HeadCheck(
-                    f"not {literal(part.data)}.startswith(head[{start}:{end}])", no_frame, "constant"
+                    test, no_frame, "constant", f"head[{start or ''}:{end}] != {literal(part.data)}"
                 )
             case LengthPart():
                 whole = isinstance(plan.frame.transparency, FrameStuffing)
@@ -744,7 +789,7 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
                 yield HeadCheck(f"len(head) >= {end} and not {bounds}", f'"length", {place}, b""')
             case IdPart() | AddressPart() | CellPart() | EqualPart():
                 for test in pieces.wrong(envelope, part, "head"):
-                    yield HeadCheck(f"len(head) >= {end} and {test}", no_frame, "constant")
+                    yield HeadCheck(f"len(head) >= {end} and {test}", no_frame, "constant", test)
                 if bare and envelope.identifies(part) and envelope.known_at(part, envelope.id):
                     yield from _bare_checks(envelope, part, f"len(head) >= {end} and", no_frame)
             case CheckPart():
@@ -771,17 +816,32 @@ def _placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> P
         else f"frame[{_edge(envelope, run[0])}:{_edge(envelope, run[-1], after=True)}]"
         for run in envelope.coverage(part)
     )
+    view = _check_view(part.check, mark)
+    start, end = _edge(envelope, part), _edge(envelope, part, after=True)
+    seeded, main = part in envelope.seeded, part is envelope.check
+    checksum = "checksum" if main else f"_CHECKSUM{mark}"
+    if view.order and view.size <= 2 and part.check.otherwise is None:
+        place = int(start or "0")
+        sent = integers.joined("frame", range(place, place + view.size), view.order)
+        result = f"crc = {checksum}.compute({covered}, {checksum}.start)"
+        wrong = f"crc != {sent}"
+    else:
+        given = f"frame{', message' if seeded else ''}{', checksum' if main else ''}"
+        result = f"right = _check{mark}({given})"
+        wrong = f"right != frame[{start}:{end}]"
     return PlacedCheck(
         name=part.name,
-        view=_check_view(part.check, mark),
-        start=_edge(envelope, part),
-        end=_edge(envelope, part, after=True),
+        view=view,
+        start=start,
+        end=end,
         covered=covered,
         otherwise=part.check.otherwise,
         mark=mark,
-        seeded=part in envelope.seeded,
-        main=part is envelope.check,
+        seeded=seeded,
+        main=main,
         early=early and part in envelope.header_checks,
+        result=result,
+        wrong=wrong,
     )
 
 

@@ -122,6 +122,22 @@ def read(integer: Integer, data: str, at: Callable[[int], str]) -> str:
     return " | ".join(group_terms(integer, own_bits(integer, sources)))
 
 
+def read_bytewise(integer: Integer, data: str, start: int) -> str:
+    """The same for two or three bytes, which is faster; an IndexError if there are too few."""
+    if integer.size not in {2, 3} or integer.signed or integer.bcd or integer.byteorder is None:
+        return read(integer, data, lambda more: str(start + more))
+    return joined(data, range(start, start + integer.size), integer.byteorder)
+
+
+def joined(data: str, places: range, byteorder: str) -> str:
+    """The number in bytes at these places."""
+    terms = [
+        f"{data}[{place}]{f' << {8 * index}' if index else ''}"
+        for index, place in enumerate(places if byteorder == "little" else reversed(places))
+    ]
+    return " | ".join(terms)
+
+
 def own_bits(integer: Integer, sources: Sequence[str]) -> tuple[str, ...]:
     """The sources with unused bits masked out."""
     pairs = zip(sources, integer.chunks, strict=True)

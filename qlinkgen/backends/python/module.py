@@ -197,6 +197,7 @@ class Module:
                 typing |= {"Any"}
             case PartsView():
                 used |= {"wrong_check", view.blocks.view.maker} if view.blocks else set()
+                used |= {"UNREAD"} if view.quick else set()
             case MarkedView():
                 used |= {"Marking", "illegal", "index", "refused"}
             case PacketView():
