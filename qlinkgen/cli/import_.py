@@ -155,7 +155,7 @@ def xlsx(
 @command.command("mavlink")
 @click.argument("file", metavar="FILE.xml", type=click.Path())
 @click.option(
-    "--version", type=click.Choice(["1"]), default="1", show_default=True, help="Version of the frame."
+    "--version", type=click.Choice(["1", "2"]), default="2", show_default=True, help="Version of the frame."
 )
 @click.option("--only", metavar="NAME", multiple=True, help="Import only this message; repeatable.")
 @_common
@@ -171,7 +171,7 @@ def mavlink(file: str, version: str, only: tuple[str, ...], name: str, output: s
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     from qlinkgen.importers.mavlink import read_mavlink  # noqa: PLC0415
 
-    number: Literal[1, 2] = 2 if version == "2" else 1
+    number: Literal[1, 2] = 1 if version == "1" else 2
     return _written(
         file, output, lambda notes: read_mavlink(file, notes, name=name, version=number, only=only)
     )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+import subprocess
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -12,17 +13,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from qlinkgen.backends.c import generate
 from qlinkgen.errors import ImportFileError
-from qlinkgen.importers.checking import written
 from qlinkgen.importers.document import Constants, Document, Field, Message, Notation
 from qlinkgen.importers.mavlink import read_mavlink
 from qlinkgen.importers.names import schema_name
 from qlinkgen.importers.notes import Notes
 from qlinkgen.importers.yaml_text import write
-from qlinkgen.plan import plan_of
-from qlinkgen.plan.codec import Codec
-from qlinkgen.schema import loads
-from tests.support.random_raw import random_address, random_beside, random_values
+from qlinkgen.plan import Options
+from tests.importers import dialects
+from tests.importers.dialects import Version, compare
+from tests.support.cdriver import WARNINGS
 
 DIALECT = """\
 <?xml version="1.0"?>
@@ -271,6 +272,10 @@ LETTERS = dict(
 )
 
 
+#: Everything that a header has.
+DEFINED = ("-DARDUPILOTMEGA_ENABLE_FLOAT=1", "-DARDUPILOTMEGA_ENABLE_NAMES=1")
+
+
 def of_pymavlink(name: str, version: str) -> tuple[Path, Mapping[int, Any]]:
     reason = "needs pymavlink (pip install pymavlink)"
     module = pytest.importorskip(f"pymavlink.dialects.{version}.{name}", reason=reason)
@@ -297,32 +302,40 @@ def test_definitions_are_those_of_pymavlink(name: str, version: Any) -> None:
 
 
 @pytest.mark.slow
-def test_frames_are_those_of_pymavlink() -> None:
-    """pymavlink reads random frames of each message of a dialect, and packs them to the same bytes."""
-    file, theirs = of_pymavlink("common", "v10")
-    notes = Notes("common.xml")
-    text = written(read_mavlink(file, notes, version=1), notes)
-    model, faults = loads(text, "common.yaml")
-    assert model is not None
-    assert faults == []
-    assert len(model.messages) == len(theirs)
-    codec = Codec(plan_of(model))
-    dialect = importlib.import_module("pymavlink.dialects.v10.common")
-    for message in model.messages:
-        rng = Random(message.name)
-        for _ in range(4):
-            values = dict(
-                zip((each.name for each in message.values), random_values(message, rng), strict=True)
-            )
-            wire = codec.encode(
-                message.name, values | random_beside(model, message, rng), random_address(message, rng)
-            )
-            read = dialect.MAVLink(None).decode(bytearray(wire))
-            assert read.get_type() == message.name.upper()
-            header = read.get_header()
-            link = dialect.MAVLink(None, header.srcSystem, header.srcComponent)
-            link.seq = header.seq
-            assert bytes(read.pack(link)) == wire
+@pytest.mark.parametrize(("name", "version"), [("common", 1), ("common", 2), ("ardupilotmega", 2)])
+def test_frames_are_those_of_pymavlink(name: str, version: Version) -> None:
+    """A frame of every message, both ways, and more of some; `tests.importers.dialects` has more."""
+    pytest.importorskip("pymavlink", reason="needs pymavlink (pip install pymavlink)")
+    found = dialects.dialect(name, version)
+    for message in found.model.messages:
+        compare(found, message, Random(message.name))
+    for message in Random(name).sample(found.model.messages, 20):
+        for seed in range(20):
+            compare(found, message, Random(seed))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_a_dialect_compiles_without_warnings(
+    tmp_path: Path, compiler: str, require_tool: Callable[..., str]
+) -> None:
+    pytest.importorskip("pymavlink", reason="needs pymavlink (pip install pymavlink)")
+    model, _ = dialects.imported("ardupilotmega", 2)
+    (header,) = generate(model, Options()).values()
+    (tmp_path / "dialect.h").write_text(header)
+    source = tmp_path / "dialect.c"
+    source.write_text('#include "dialect.h"\n')
+    command = [require_tool(compiler, package=compiler), "-std=c99", "-fsyntax-only", *WARNINGS, *DEFINED]
+    done = subprocess.run([*command, source], capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert done.stderr == ""
+
+
+@pytest.mark.slow
+def test_generation_grows_with_the_number_of_messages() -> None:
+    pytest.importorskip("pymavlink", reason="needs pymavlink (pip install pymavlink)")
+    (_, _), (half, before), (whole, after) = dialects.shares("common", 2)
+    assert after / before < 1.6 * whole / half
 
 
 def code(field: Field, document: Document) -> str:

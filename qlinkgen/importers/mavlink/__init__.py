@@ -41,6 +41,8 @@ _COVERED = {
     1: ["length", "sequence", "system", "component", "number", "data"],
     2: ["length", "incompatible", "compatible", "sequence", "system", "component", "number", "data"],
 }
+#: Parts that are attributes of messages, as their fields are.
+_VALUES = {"compatible", "sequence", "system", "component"}
 
 
 def read_mavlink(
@@ -79,7 +81,7 @@ def read_mavlink(
             "source": file.name,
         },
         byteorder="little",
-        frame=_frame(version),
+        frame=_frame(version, {field.name for item in items for field in item.fields}),
         bus={"kind": "master_slave", "nodes": between(1, 255)},
         sections={"enums": enums.enums, "flags": enums.flags, "messages": items},
         attributes={"crc_extra": {"type": "u8", "doc": "Checksum of the definition of the message"}},
@@ -172,27 +174,27 @@ def _unit(unit: str, *, scaled: bool, whole: bool) -> dict[str, Value]:
     return {"unit": unit} if unit else {}
 
 
-def _frame(version: Literal[1, 2]) -> Value:
+def _frame(version: Literal[1, 2], taken: set[str]) -> Value:
+    """The frame; values of every frame are not called like a field."""
+    named = {each: f"frame_{each}" if each in taken & _VALUES else each for each in _COVERED[version]}
     head: dict[str, Value] = {"start": Notation("FD" if version == 2 else "FE")}
     head["length"] = {"type": "u8", "counts": ["data"]}
     if version == 2:
-        head["incompatible"] = {"type": "u8", "bits": {"signed": 0}}
-        head["compatible"] = {"type": "u8", "default": 0}
+        head["incompatible"] = {"type": "u8", "const": 0}  # such as a signature
+        head[named["compatible"]] = {"type": "u8", "default": 0}
     data: dict[str, Value] = {"role": "payload", "size": between(0, 255)}
     check: dict[str, Value] = {
         "type": "u16",
         "algorithm": "crc-16/mcrf4xx",
-        "over": [*_COVERED[version], "attribute.crc_extra"],
+        "over": [*named.values(), "attribute.crc_extra"],
     }
     parts: dict[str, Value] = {
         **head,
-        "sequence": {"role": "counter", "type": "u8", "per": "frame"},
-        "system": {"role": "address", "type": "u8"},
-        "component": {"type": "u8", "default": 1},
+        named["sequence"]: {"role": "counter", "type": "u8", "per": "frame"},
+        named["system"]: {"role": "address", "type": "u8"},
+        named["component"]: {"type": "u8", "default": 1},
         "number": {"role": "message", "type": "u24" if version == 2 else "u8"},
-        "data": {**data, "trim": "zeros"} if version == 2 else data,
+        "data": {**data, "trim": {"zeros": True, "keep": 1}} if version == 2 else data,
         "crc": check,
     }
-    if version == 2:
-        parts["signature"] = {"type": "bytes[13]", "if": "incompatible.signed"}
     return Block({"parts": Block(parts)})
