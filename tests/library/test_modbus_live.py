@@ -25,6 +25,16 @@ REGISTERS = [each * 3 for each in range(100)]
 COILS = [each % 3 == 0 or each % 7 == 0 for each in range(2400)]
 
 
+@pytest.fixture(params=["rtu", "ascii"])
+def framing(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def codec(framing: str) -> Any:
+    return described(f"modbus_{framing}").module
+
+
 @pytest.fixture
 def pty() -> Iterator[PtyPort]:
     with open_pty() as port:
@@ -32,7 +42,7 @@ def pty() -> Iterator[PtyPort]:
 
 
 @pytest.fixture
-def server(pty: PtyPort) -> Iterator[None]:
+def server(pty: PtyPort, framing: str) -> Iterator[None]:
     """The server of pymodbus at the other end."""
     from pymodbus.framer import FramerType
     from pymodbus.server import ModbusSerialServer
@@ -45,7 +55,8 @@ def server(pty: PtyPort) -> Iterator[None]:
 
     async def main() -> None:
         device = SimDevice(NODE, simdata=([coils], [inputs], [registers], [registers]))
-        made = ModbusSerialServer(context=device, framer=FramerType.RTU, port=pty.path, baudrate=115200)
+        framer = FramerType[framing.upper()]
+        made = ModbusSerialServer(context=device, framer=framer, port=pty.path, baudrate=115200)
         stop = asyncio.Event()
         loop.stop_it = stop.set  # type: ignore[attr-defined]
         await made.listen()
@@ -63,13 +74,11 @@ def server(pty: PtyPort) -> Iterator[None]:
 
 
 @pytest.fixture
-def master(pty: PtyPort, server: None) -> BlockingMaster:
-    codec = described("modbus_rtu").module
+def master(pty: PtyPort, server: None, codec: Any) -> BlockingMaster:
     return BlockingMaster(MasterEngine(codec, timing_of(codec, pty, slack=5.0)), pty)
 
 
-def test_our_master_reads_and_writes(master: BlockingMaster) -> None:
-    codec: Any = described("modbus_rtu").module
+def test_our_master_reads_and_writes(master: BlockingMaster, codec: Any) -> None:
     ask: Callable[[Any], Any] = lambda request: master.transact(request).response  # noqa: E731
     read = codec.ReadHoldingRegistersRequest(node=NODE, start=10, quantity=90)
     assert ask(read).registers == REGISTERS[10:]
@@ -85,16 +94,14 @@ def test_our_master_reads_and_writes(master: BlockingMaster) -> None:
 
 
 @pytest.mark.parametrize("number", [1, 8, 37, 2000])
-def test_our_master_reads_coils_and_inputs(master: BlockingMaster, number: int) -> None:
-    codec: Any = described("modbus_rtu").module
+def test_our_master_reads_coils_and_inputs(master: BlockingMaster, codec: Any, number: int) -> None:
     coils = master.transact(codec.ReadCoilsRequest(node=NODE, start=0x13, quantity=number)).response
     assert coils.coils == COILS[0x13 : 0x13 + number]
     inputs = master.transact(codec.ReadDiscreteInputsRequest(node=NODE, start=5, quantity=number)).response
     assert inputs.inputs == COILS[::-1][5 : 5 + number]
 
 
-def test_an_exception_ends_a_call_at_once_with_its_code(master: BlockingMaster) -> None:
-    codec: Any = described("modbus_rtu").module
+def test_an_exception_ends_a_call_at_once_with_its_code(master: BlockingMaster, codec: Any) -> None:
     begun = time.monotonic()
     with pytest.raises(Refused) as caught:
         master.transact(codec.ReadHoldingRegistersRequest(node=NODE, start=99, quantity=2))
@@ -136,8 +143,7 @@ class Registers:
 
 
 @pytest.fixture
-def slave(pty: PtyPort) -> Iterator[Registers]:
-    codec = described("modbus_rtu").module
+def slave(pty: PtyPort, codec: Any) -> Iterator[Registers]:
     node, stopped = Registers(codec), threading.Event()
     engine = SlaveEngine(codec, node)
     thread = threading.Thread(target=serve, args=(pty, engine), kwargs={"stop": stopped.is_set})
@@ -147,10 +153,12 @@ def slave(pty: PtyPort) -> Iterator[Registers]:
     thread.join(10)
 
 
-def test_our_slave_answers_its_client(pty: PtyPort, slave: Registers) -> None:
+def test_our_slave_answers_its_client(pty: PtyPort, slave: Registers, framing: str) -> None:
     from pymodbus.client import ModbusSerialClient
+    from pymodbus.framer import FramerType
 
-    client = ModbusSerialClient(pty.path, baudrate=115200, timeout=10, retries=0)
+    framer = FramerType[framing.upper()]
+    client = ModbusSerialClient(pty.path, framer=framer, baudrate=115200, timeout=10, retries=0)
     assert client.connect()
     try:
         found = client.read_holding_registers(10, count=90, device_id=NODE)
