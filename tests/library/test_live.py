@@ -162,3 +162,40 @@ def test_sensirion_driver_reads_a_sensor() -> None:
         assert device.get_serial_number() == "0123456789ABCDEF"
         with pytest.raises(ShdlcDeviceError):
             device.device_reset()
+
+
+def test_pyvesc_drives_a_motor() -> None:
+    peer("vesc")
+    import pyvesc
+    import serial
+    from pyvesc.packet.codec import unframe
+
+    codec: Any = described("vesc").module
+    values = codec.GetValuesResponse(fet=31.5, motor=40.0, speed=-1200, voltage=48.1, fault=3)
+    seen = []
+
+    def motor(request: Any) -> Any:
+        seen.append(request)
+        return values if type(request) is codec.GetValuesRequest else None
+
+    def measured(line: serial.Serial) -> Any:
+        """Ask until the whole answer is there; what was sent before it has been received then."""
+        line.write(pyvesc.encode_request(pyvesc.GetValues))
+        answer, payload = b"", None
+        while payload is None:
+            received = line.read(1)
+            assert received, "no answer"
+            answer += received
+            payload, _ = unframe(answer)
+        return payload
+
+    with serving("vesc", 0, motor) as pty, serial.Serial(pty.path, timeout=PATIENCE) as line:
+        for message in (pyvesc.SetDutyCycle(25_000), pyvesc.SetRPM(-1200), pyvesc.SetCurrent(1500)):
+            line.write(pyvesc.encode(message))
+            # Its fields are those of an older firmware, so it cannot name them.
+            assert measured(line) == bytes((codec.GetValuesRequest.ID,)) + values.to_bytes()
+    asked = codec.GetValuesRequest()
+    assert seen == [
+        codec.SetDutyRequest(duty=0.25), asked, codec.SetSpeedRequest(speed=-1200), asked,
+        codec.SetCurrentRequest(current=1.5), asked,
+    ]  # fmt: skip
