@@ -10,11 +10,11 @@ from typing import Protocol as Shape
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import did_you_mean
 from qlinkgen.link import codec as link
-from qlinkgen.model.fields import Layout, Record, Records, Value
+from qlinkgen.model.fields import Layout, Record, Records, Value, chosen
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import address_attribute, attribute
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.values import BadValue, Json, Native, check_items, from_json, to_json
+from qlinkgen.model.values import BadValue, Json, Native, check_items, default_of, natives_of, to_json
 
 
 class MessageObject(link.Message, Shape):
@@ -49,15 +49,17 @@ def build(
         fix = " ".join(f"{name}=VALUE" for name in missing)
         raise Failure(f"{message.name}: {', '.join(missing)} has no default; add {fix}")
     try:
-        natives = {name: from_json(values[name], each) for name, each in given.items()}
+        natives = natives_of((*beside, *message.values), given)
+        numbers = {value.name: default_of(value) for value in message.values if not value.field.slot}
+        own = {value.name: value for value in chosen((*beside, *message.values), {**numbers, **natives}.get)}
         for name, native in natives.items():
-            check_items(values[name], native)
+            check_items(own[name], native)
     except BadValue as error:
         raise Failure(f"{message.name}: {error}") from None
     try:
         built: MessageObject = codec.MESSAGES[message.name](
             **{address_attribute(name): number for name, number in address.items()},
-            **{attribute(name): _object(codec, values[name], native) for name, native in natives.items()},
+            **{attribute(name): _object(codec, own[name], native) for name, native in natives.items()},
         )
     except codec.EncodeError as error:
         raise Failure(str(error)) from None
@@ -66,7 +68,10 @@ def build(
 
 def fields(message: Message, found: link.Message) -> dict[str, Json]:
     """Return the values of a message object, for JSON."""
-    return {value.name: to_json(value, _plain(value, found)) for value in message.values}
+    return {
+        value.name: to_json(value, _plain(value, found))
+        for value in chosen(message.values, lambda name: getattr(found, attribute(name)))
+    }
 
 
 def _object(codec: ModuleType, value: Value, native: Native) -> object:
@@ -77,7 +82,8 @@ def _object(codec: ModuleType, value: Value, native: Native) -> object:
         return [_object(codec, one, each) for each in native]
     if not isinstance(kind, Record) or not isinstance(native, Mapping):
         return native
-    values = {attribute(each.name): _object(codec, each, native[each.name]) for each in kind.layout.values}
+    own = chosen(kind.layout.values, native.get)
+    values = {attribute(each.name): _object(codec, each, native[each.name]) for each in own}
     return codec.RECORDS[kind.layout.name](**values)
 
 
@@ -85,13 +91,16 @@ def _plain(value: Value, owner: object) -> Native:
     """The value of an attribute; a mapping for each record."""
     found: Native | Sequence[object] = getattr(owner, attribute(value.name))
     kind = value.type
+    if found is None:
+        return None
     if isinstance(kind, Records) and isinstance(found, Sequence):
         return [_mapping(kind.layout, each) for each in found]
     return _mapping(kind.layout, found) if isinstance(kind, Record) else found  # type: ignore[return-value]
 
 
 def _mapping(layout: Layout, record: object) -> Mapping[str, Native]:
-    return {each.name: _plain(each, record) for each in layout.values}
+    own = chosen(layout.values, lambda name: getattr(record, attribute(name)))
+    return {each.name: _plain(each, record) for each in own}
 
 
 def _no_field(message: Message, name: str, known: list[str]) -> str:

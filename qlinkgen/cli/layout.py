@@ -20,7 +20,7 @@ from qlinkgen.plan.describe import (
     span_text,
     type_text,
 )
-from qlinkgen.plan.payload import BitsStep, Member, PayloadPlan, Step
+from qlinkgen.plan.payload import BitsStep, Member, PayloadPlan, Step, value_name
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 UNCONFIRMED = "unconfirmed"
@@ -103,7 +103,8 @@ def _facts(plan: Plan, planned: MessagePlan) -> list[str]:
 
 def _layout(title: str, stated: Message | Layout, payload: PayloadPlan) -> None:
     table = Table(COLUMNS, title, frozenset({"offset", "bytes"}))
-    values, docs = {value.name: value for value in stated.values}, stated.docs
+    values = {each.name: value for value, each in zip(stated.values, payload.settable, strict=True)}
+    docs = stated.docs
     moving = [step for segment in payload.segments[1:] for step in segment.steps]
     moving += payload.steps[1:] if payload.separator else []
     for field, step in zip(stated.fields, payload.steps, strict=True):
@@ -116,7 +117,7 @@ def _layout(title: str, stated: Message | Layout, payload: PayloadPlan) -> None:
             offset = None
         table.add(
             ("..." if payload.walked else size_text(step.place.front)) if offset is None else offset,
-            step.name,
+            value_name(step),
             span_text(field.min_size, field.max_size),
             *_about(step, values.get(step.name)),
             field.doc,

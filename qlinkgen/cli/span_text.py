@@ -31,6 +31,7 @@ from qlinkgen.plan.payload import (
     ReservedStep,
     Step,
     ValueStep,
+    value_name,
 )
 from qlinkgen.plan.spans import Around, Dissection, Span
 
@@ -51,7 +52,7 @@ def value_of(found: Dissection, span: Span) -> tuple[str, str]:
     of = span.of
     if isinstance(of, Around):
         return _AROUND[of]
-    name = span.inside + of.name
+    name = span.inside + (of.name if isinstance(of, Part) else value_name(of))
     # Other fields lack only zeros that were not sent.
     short = len(span.raw) < span.size and (isinstance(of, Part) or span.fault in ("length", "truncated"))
     if short:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar, assert_never
+from typing import ClassVar, SupportsInt, assert_never
 
 from qlinkgen.model.condition import Condition, turning_points
 from qlinkgen.model.texts import Text
@@ -101,6 +101,9 @@ class Field:
     optional: bool = False
     #: A new message has it.
     given: bool = True
+    #: The value of which it is a case, and the name of the case; "" for other fields.
+    slot: str = ""
+    case: str = ""
 
     @property
     def conditional(self) -> bool:
@@ -210,11 +213,30 @@ def values_of(fields: Iterable[Field]) -> Iterator[Value]:
                     yield Value(member.name, member.type, member.doc, each, member)
             case Scalar():
                 if kind.settable:
-                    yield Value(each.name, kind, each.doc, each)
+                    yield Value(each.slot or each.name, kind, each.doc, each)
             case Blob() | Array() | Record() | Records():
-                yield Value(each.name, kind, each.doc, each)
+                yield Value(each.slot or each.name, kind, each.doc, each)
             case _:
                 assert_never(kind)
+
+
+def chosen(values: Iterable[Value], native: Callable[[str], object]) -> tuple[Value, ...]:
+    """The values that a message has: of each choice, the case for the tested number.
+
+    Of a choice without a case for it, the first one, which is absent. ``native`` gives native or raw values
+    by name.
+    """
+    found: dict[str, Value] = {}
+    for value in values:
+        if value.name not in found or applies(value.field.when, native):
+            found[value.name] = value
+    return tuple(found.values())
+
+
+def applies(when: Condition, native: Callable[[str], object]) -> bool:
+    """Whether a condition holds for native or raw numbers."""
+    numbers = [(test, native(test.value)) for test in when]
+    return all(isinstance(number, SupportsInt) and test.holds(int(number)) for test, number in numbers)
 
 
 def docs_of(fields: Iterable[Field]) -> dict[str, str]:

@@ -12,13 +12,13 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
 from typing import SupportsInt, TypeAlias, assert_never
 
-from qlinkgen.model.fields import Layout, Record, Records, Value
+from qlinkgen.model.fields import Layout, Record, Records, Value, applies, chosen
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Float, Scalar
 
 #: A JSON value; numbers with a decimal point are read as Decimal.
@@ -63,7 +63,11 @@ def default_of(value: Value) -> Native:
 
 def defaults_of(layout: Layout) -> Mapping[str, Native]:
     """The native defaults of a record."""
-    return {value.name: default_of(value) for value in layout.values}
+    found: dict[str, Native] = {}
+    for value in layout.values:
+        if found.get(value.name) is None:
+            found[value.name] = default_of(value)
+    return found
 
 
 def native_from_raw(scalar: Scalar, raw: int) -> Item:
@@ -121,7 +125,9 @@ def to_json(value: Value, native: Native) -> Json:
         return None
     if isinstance(kind, Record):
         assert isinstance(native, Mapping)
-        return {each.name: to_json(each, native[each.name]) for each in kind.layout.values}
+        return {
+            each.name: to_json(each, native[each.name]) for each in chosen(kind.layout.values, native.get)
+        }
     if isinstance(kind, Records):
         assert isinstance(native, Sequence)
         one = replace(value, type=Record(kind.layout))
@@ -173,6 +179,32 @@ def from_json(value: Value, given: Json) -> Native:
     return _item_from_json(value.name, kind, given)
 
 
+def natives_of(values: Sequence[Value], given: Mapping[str, Json], owner: str = "") -> dict[str, Native]:
+    """The native values of those given, by name; of a choice, that of the case which is sent.
+
+    ``owner`` precedes the names in errors.
+    """
+    plain = [value for value in values if not value.field.slot]
+    found = {each.name: _of_json(each, given, owner) for each in plain if each.name in given}
+    numbers = {each.name: found.get(each.name, default_of(each)) for each in plain}
+    for each in chosen(values, numbers.get):
+        if each.field.slot:
+            found[each.name] = (
+                _of_json(each, given, owner) if each.name in given else _usual(each, numbers.get)
+            )
+    return found
+
+
+def _usual(case: Value, native: Callable[[str], Native]) -> Native:
+    """The default of a case that is sent."""
+    sent = applies(case.field.when, native) and not case.type.required
+    return default_of(replace(case, field=replace(case.field, given=sent)))
+
+
+def _of_json(value: Value, given: Mapping[str, Json], owner: str) -> Native:
+    return from_json(replace(value, name=owner + value.name), given[value.name])
+
+
 def _item_from_json(name: str, scalar: Scalar, given: Json) -> Item:
     meaning = scalar.meaning
     if isinstance(meaning, Enum) and isinstance(given, str):
@@ -193,7 +225,7 @@ def check_items(value: Value, native: Native) -> None:
     """Check the number of items of a list, and the range of each. Raises BadValue."""
     kind = value.type
     if isinstance(kind, Record) and isinstance(native, Mapping):
-        for each in kind.layout.values:
+        for each in chosen(kind.layout.values, native.get):
             check_items(_inside(value.name, each), native[each.name])
     if not isinstance(kind, Array | Records) or not isinstance(native, list):
         return
@@ -241,9 +273,10 @@ def _record(name: str, layout: Layout, given: Json) -> Mapping[str, Native]:
         raise BadValue(f"{name}: a record {layout.name} has no '{unknown[0]}'; it has {', '.join(values)}")
     if missing := [each for each, value in values.items() if value.required and each not in given]:
         raise BadValue(f"{name}: {', '.join(missing)} has no default; add it")
+    own = natives_of(layout.values, given, f"{name}.")
+    numbers = {value.name: default_of(value) for value in layout.values if not value.field.slot} | own
     return {
-        each: from_json(_inside(name, value), given[each]) if each in given else default_of(value)
-        for each, value in values.items()
+        value.name: own.get(value.name, default_of(value)) for value in chosen(layout.values, numbers.get)
     }
 
 

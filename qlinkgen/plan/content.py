@@ -6,6 +6,7 @@ of raw values for a record; None for an absent field.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TypeAlias, assert_never
 
@@ -35,6 +36,7 @@ from qlinkgen.plan.payload import (
     holders,
     limits,
     term_of,
+    value_name,
 )
 from qlinkgen.plan.separated import joined, visit
 from qlinkgen.plan.walk import Missing, Wrong, present
@@ -89,11 +91,17 @@ class MoreNeeded(Exception):
 
 def pack(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
     """The payload with these values, defaults for missing ones. Raises Unsendable."""
-    whole = {each.name: values.get(each.name, default_of(each)) for each in plan.settable}
     if plan.separator:
-        return _pack_separated(plan, whole)
+        return _pack_separated(
+            plan, {each.name: values.get(each.name, default_of(each)) for each in plan.settable}
+        )
     if plan.walked:
-        return _pack_walked(plan, whole)
+        by_case = _by_case(plan, values)
+        try:
+            return _pack_walked(plan, by_case)
+        except Unsendable as unsendable:
+            raise Unsendable(_public(plan, unsendable.field), unsendable.value) from None
+    whole = {each.name: values.get(each.name, default_of(each)) for each in plan.settable}
     counts = {run.name: _count(run, whole[run.name]) for run in plan.runs}
     return plan.trimmed(b"".join(_packed(step, whole, counts) for step in plan.steps))
 
@@ -104,6 +112,37 @@ def _pack_separated(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
         absent = step.presence is not None and values[step.name] is None
         texts.append(b"" if absent else _packed(step, values, {}))
     return joined(plan, texts)
+
+
+def _by_case(plan: PayloadPlan, values: Mapping[str, Raw]) -> dict[str, Raw]:
+    """The values by field: that of a choice belongs to the case that is sent. Raises Unsendable."""
+    given = {**defaults(plan), **values}
+    numbers = {name: value for name, value in given.items() if isinstance(value, int)}
+    found: dict[str, Raw] = {}
+    left: dict[str, Raw] = {}
+    for each in plan.settable:
+        name, presence = value_name(each), each.presence
+        if presence is None or not presence.slot:
+            found[name] = given[name]
+        elif present(presence, numbers, 0):
+            found[each.name] = given[name]
+            left[name] = None
+        else:
+            found[each.name] = None
+            left.setdefault(name, given[name])
+    for name, value in left.items():
+        if value is not None:
+            raise Unsendable(name, value)
+    return found
+
+
+def by_value(plan: PayloadPlan, found: Mapping[str, Raw]) -> dict[str, Raw]:
+    """Values by field as values of the message: of each choice, that of the case which is present."""
+    values: dict[str, Raw] = {}
+    for each in plan.settable:
+        if values.get(value_name(each)) is None:
+            values[value_name(each)] = found[each.name]
+    return values
 
 
 def _pack_walked(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
@@ -147,7 +186,7 @@ def default_of(each: Holder) -> Raw:
 
 def defaults(plan: PayloadPlan) -> dict[str, Raw]:
     """The defaults of all fields."""
-    return {each.name: default_of(each) for each in plan.settable}
+    return by_value(plan, {each.name: default_of(each) for each in plan.settable})
 
 
 def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) -> bytes:
@@ -267,8 +306,18 @@ def _unpack_walked(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
             else:
                 values |= _unpacked(each.step, each.data, _counts_of(each.step, each.data), each.at)
     except Wrong as wrong:
-        raise BadContent("length", wrong.field, wrong.at) from None
-    return values
+        raise BadContent("length", _public(plan, wrong.field), wrong.at) from None
+    except BadContent as bad:
+        raise BadContent(bad.kind, _public(plan, bad.field), bad.offset) from None
+    return by_value(plan, values)
+
+
+def _public(plan: PayloadPlan, path: str) -> str:
+    """The path of a value, with the name of the choice in place of its case."""
+    names = {each.name: value_name(each) for each in plan.settable}
+    first = re.match(r"\w*", path)
+    assert first is not None
+    return names.get(first[0], first[0]) + path[first.end() :]
 
 
 def _counts_of(step: Step, data: bytes) -> Mapping[str, int]:

@@ -27,6 +27,7 @@ from qlinkgen.plan.payload import (
     full_size,
     least_size,
     term_of,
+    value_name,
 )
 from qlinkgen.plan.separated import visit
 from qlinkgen.plan.spans import Around, Span
@@ -157,7 +158,9 @@ class Fields:
         """Divide each record, the last one as far as received."""
         size = step.record.size
         for index, at in enumerate(range(0, len(places), size)):
-            name = f"{step.name}[{index}]." if isinstance(step, RecordsStep) else f"{step.name}."
+            name = (
+                f"{value_name(step)}[{index}]." if isinstance(step, RecordsStep) else f"{value_name(step)}."
+            )
             self._record(step.record, name, places[at : at + size])
 
     def _record(self, record: RecordPlan, name: str, places: tuple[int, ...]) -> None:

@@ -7,11 +7,12 @@ sizes are consistent, so a decoder reports `length` before `range`, in any order
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import assert_never
 
-from qlinkgen.model.condition import Test
+from qlinkgen.model.condition import Test, turning_points
 from qlinkgen.model.integer import BitOrder, Integer
 from qlinkgen.model.types import (
     Enum,
@@ -50,12 +51,16 @@ class Presence:
         when: tests of earlier values, all of which hold; () for an optional field.
         optional: it is present if bytes are left, and sent if the caller gives it.
         given: a new message has it.
+        slot: the value of which the field is a case, "" for other fields.
+        case: name of the case.
     """
 
     field: str
     when: tuple[Test, ...]
     optional: bool
     given: bool
+    slot: str = ""
+    case: str = ""
 
 
 # Steps ------------------------------------------------------------------------------------------------------
@@ -407,6 +412,15 @@ class PayloadPlan:
         return bool(self.segments or self.separator)
 
     @property
+    def by_choice(self) -> tuple[tuple[Segment, tuple[Segment, ...]], ...]:
+        """The segments; those of the cases of a choice once, with the first of them, () for others."""
+        found: list[tuple[Segment, tuple[Segment, ...]]] = []
+        for slot, group in groupby(self.segments, lambda each: each.presence.slot if each.presence else ""):
+            own = tuple(group)
+            found += [(own[0], own)] if slot else [(each, ()) for each in own]
+        return tuple(found)
+
+    @property
     def fixed(self) -> bool:
         """Whether the size is constant."""
         return not self.size.terms and not self.walked
@@ -474,6 +488,30 @@ def holders(steps: Iterable[Step]) -> tuple[Holder, ...]:
             case _:
                 assert_never(step)
     return tuple(found)
+
+
+def complete(cases: Iterable[Segment]) -> bool:
+    """Whether one of the cases of a choice applies to every number."""
+    tests = [test for each in cases if each.presence for test in each.presence.when]
+    return all(any(test.holds(raw) for test in tests) for raw in turning_points(tests))
+
+
+def by_slot(each: Iterable[Holder]) -> tuple[tuple[Holder, ...], ...]:
+    """Steps and members by their value: the cases of a choice together."""
+    found: dict[str, list[Holder]] = {}
+    for one in each:
+        found.setdefault(value_name(one), []).append(one)
+    return tuple(map(tuple, found.values()))
+
+
+def first_case(slot: Sequence[Holder]) -> Holder:
+    """The case that a new message has, the first one if it has none of them."""
+    return next((each for each in slot if each.presence is None or each.presence.given), slot[0])
+
+
+def value_name(each: Holder | Step) -> str:
+    """The name of the value: of a case, that of the whole choice."""
+    return (each.presence and each.presence.slot) or each.name
 
 
 def full_size(step: Step) -> int:

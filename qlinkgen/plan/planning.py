@@ -217,7 +217,7 @@ def _presence(field: Field) -> Presence | None:
     """What decides whether a field is present, None if it always is."""
     if not field.conditional:
         return None
-    return Presence(field.name, field.when, field.optional, field.given)
+    return Presence(field.name, field.when, field.optional, field.given, field.slot, field.case)
 
 
 def _present(step: Step, presence: Presence | None) -> Step:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from qlinkgen.model.condition import Condition, Test, exclusive
+from qlinkgen.model.condition import Condition, Test, exclusive, turning_points
 from qlinkgen.model.fields import Field, Records, Value, values_of
 from qlinkgen.model.types import Array, Blob, Count, Enum, Float, Scalar
 from qlinkgen.schema.file_fields import Fields
@@ -37,6 +37,7 @@ class ConditionBuilder:
             when = self._condition(field, spec.when or (), found)
             given = not spec.optional and self._holds(when, found)
             found.append(replace(field, when=when, optional=spec.optional, given=given))
+        self._check_cases(found)
         for field in () if self._separated else found:
             self._check(field, found)
             if any(each.conditional for each in found) and _is_packed_run(field):
@@ -47,7 +48,9 @@ class ConditionBuilder:
 
     def _error(self, field: str, key: str, what: str, hint: str) -> None:
         place = (*self._path, field)
-        self._report.error(_RULE, (*place, key), what, hint, of_key=True, needs=(place, self._path))
+        spec = self._specs.get(field)
+        rule = _RULE if spec is None or spec.case is None else "bad-switch"
+        self._report.error(rule, (*place, key), what, hint, of_key=True, needs=(place, self._path))
 
     # Conditions
 
@@ -65,13 +68,18 @@ class ConditionBuilder:
 
     def _tested(self, field: Field, text: TestText, before: Sequence[Field]) -> Value | None:
         """The value that a condition names: of an earlier field, or of its bits."""
-        values = {value.name: value for value in values_of(before)}
+        key = "switch" if field.slot else "if"
+        values = {
+            value.name: value
+            for value in values_of(before)
+            if value.field.slot != field.slot or not field.slot
+        }
         owner, _, bit = text.field.partition(".")
         value = values.get(bit or owner)
         if value is None or (bit and value.field.name != owner):
             hint = did_you_mean(text.field, values, f"earlier fields with a value: {listed(values)}")
-            what = f"{field.name} has no field {shown(text.field)} with a value before it"
-            self._error(field.name, "if", what, hint)
+            what = f"{field.slot or field.name} has no field {shown(text.field)} with a value before it"
+            self._error(field.name, key, what, hint)
             return None
         kind = value.type
         plain = (
@@ -82,12 +90,13 @@ class ConditionBuilder:
             and kind.integer.bits <= 64
         )
         if not plain or (isinstance(kind, Scalar) and isinstance(kind.meaning, Float)):
-            what = f"{text.field} cannot decide whether {field.name} is present"
-            self._error(field.name, "if", what, "name a whole number of up to 64 bits, an enum or a bool")
+            what = f"what {field.slot} is" if field.slot else f"whether {field.name} is present"
+            what = f"{text.field} cannot decide {what}"
+            self._error(field.name, key, what, "name a whole number of up to 64 bits, an enum or a bool")
             return None
         if value.field.conditional:
             what = f"{text.field} may itself be absent"
-            self._error(field.name, "if", what, "name a field that is always present")
+            self._error(field.name, key, what, "name a field that is always present")
             return None
         return value
 
@@ -109,6 +118,40 @@ class ConditionBuilder:
             self._error(field.name, "if", f"{wanted.text} is outside the range of the tested field", hint)
             return None
         return first, last
+
+    def _check_cases(self, fields: Sequence[Field]) -> None:
+        """Check that the cases of each choice exclude each other, and that every value has one."""
+        choices: dict[str, list[Field]] = {}
+        for field in fields:
+            if field.slot and field.when:
+                choices.setdefault(field.slot, []).append(field)
+        values = {value.name: value.type for value in values_of(fields)}
+        for slot, cases in choices.items():
+            for index, case in enumerate(cases):
+                other = next((each for each in cases[:index] if not exclusive(each.when, case.when)), None)
+                if other is not None:
+                    what = f"two cases of {slot} have values in common: {other.case} and {case.case}"
+                    self._error(case.name, "if", what, "make them exclude each other")
+            tested = values.get(cases[0].when[0].value)
+            assert isinstance(tested, Scalar)
+            missing = self._unnamed(cases[0], tested)
+            if missing is not None:
+                what = f"{slot} has no case for {missing}, which {cases[0].when[0].value} may be"
+                hint = "add it, or default: bytes, or default: {} for no value"
+                self._error(cases[0].name, "cases", what, hint)
+
+    def _unnamed(self, case: Field, tested: Scalar) -> int | None:
+        """A value of the tested field that has no case."""
+        of = self._specs[case.name].case
+        if of is None or of.named is None:
+            return None
+        ranges = [self._range(case, each, tested) for each in of.named]
+        if None in ranges:
+            return None
+        test = Test("", tuple(each for each in ranges if each))
+        raws = sorted({tested.minimum, *turning_points((test,))})
+        inside = (raw for raw in raws if tested.minimum <= raw <= tested.maximum)
+        return next((raw for raw in inside if not test.holds(raw)), None)
 
     @staticmethod
     def _holds(when: Condition, before: Sequence[Field]) -> bool:

@@ -38,11 +38,19 @@ def _resolved(field: Field, fields: Sequence[Field], specs: Fields, path: Path, 
     return replace(field, type=replace(kind, role=Count(varying[0], "bytes", beside)))
 
 
+def of_choice(name: str) -> tuple[str, str]:
+    """Error and fix for a count of a choice."""
+    hint = "put a number into each case, as {size: {type: u8, const: 4}, value: u32}"
+    return f"{name} is a choice, whose size follows from its case", hint
+
+
 def _fault(
     names: Sequence[str], varying: Sequence[str], known: dict[str, Field], specs: Fields
 ) -> tuple[str, str] | None:
     """Error and fix for what a count names, None if it is right."""
     for name in names:
+        if any(each.slot == name for each in known.values()):
+            return of_choice(name)
         if name not in known:
             hint = did_you_mean(name, known, f"the fields are {listed(known)}")
             return f"{shown(name)} is not a field that it can count", hint

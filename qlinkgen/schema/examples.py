@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from typing import TYPE_CHECKING, cast
 
+from qlinkgen.model.fields import chosen
 from qlinkgen.model.message import Example, Message, Value
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import BadValue, Json, default_of, from_json, to_json
@@ -66,8 +67,8 @@ class _Checker:
         every = self._protocol.beside(message)
         names = {_key(value.name): (value, beside[value.name]) for value in every}
         self._compare("the frame", names, decoded.beside, parts, path)
-        steps = zip(message.values, decoded.message.payload.settable, strict=True)
-        inside = {value.name: (value, step) for value, step in steps}
+        steps = dict(zip(message.values, decoded.message.payload.settable, strict=True))
+        inside = {value.name: (value, steps[value]) for value in chosen(steps, decoded.values.get)}
         self._compare(message.name, inside, decoded.values, values, (*path, key))
         return Example(message.name, spec.wire, spec.after, decode_only=spec.decode_only)
 

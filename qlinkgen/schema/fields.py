@@ -10,7 +10,7 @@ from qlinkgen.model.fields import Field, FieldType, Records, greatest_size
 from qlinkgen.model.types import Array, Blob, Count, Scalar
 from qlinkgen.schema.conditions import ConditionBuilder
 from qlinkgen.schema.counted import with_counts
-from qlinkgen.schema.counting import with_beside
+from qlinkgen.schema.counting import of_choice, with_beside
 from qlinkgen.schema.file_fields import Fields, FieldSpec, RecordSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.location import Location
@@ -51,7 +51,9 @@ class FieldBuilder:
                 if not separated:
                     self._check_text(kind, (*path, name))
                 doc, confirmed = self._inherited(spec)
-                fields.append(Field(name, kind, doc, spec.section, confirmed, spec.echo))
+                field = Field(name, kind, doc, spec.section, confirmed, spec.echo)
+                of = spec.case
+                fields.append(field if of is None else replace(field, slot=of.slot, case=of.name))
         fields = with_beside(fields, specs, path, self._report)
         fields = ConditionBuilder(specs, path, self._report, separated=separated).build(fields)
         fields = self._counted(fields, path, asked)
@@ -132,6 +134,10 @@ class FieldBuilder:
         later = {each.name: each for each in fields[fields.index(field) + 1 :]}
         target = later.get(count.run)
         needs = (path[:-1], (*path[:-2], count.run))
+        if any(each.slot == count.run for each in later.values()):
+            self._report.error("bad-count", path, *of_choice(count.run), needs=needs)
+            self._report.taint(path)
+            return False
         if target is None or not isinstance(target.type, Blob | Array | Records) or target.type.length.fixed:
             known = [name for name, other in later.items() if not other.fixed]
             hint = did_you_mean(count.run, known, f"fields of variable size: {listed(known)}")

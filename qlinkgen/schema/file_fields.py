@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Discriminator, Field, StrictBool, StrictInt, Tag
+from pydantic import Discriminator, Field, PrivateAttr, StrictBool, StrictInt, Tag
 
 from qlinkgen.schema.file_base import BRANCH, Fact, FileMapping, Lifetime, Names
 from qlinkgen.schema.kinds import (
@@ -19,6 +20,7 @@ from qlinkgen.schema.kinds import (
     Text,
     WholeRange,
 )
+from qlinkgen.schema.notation import TestText, Wanted
 
 
 class GroupSpec(FileMapping):
@@ -80,6 +82,21 @@ class BitSpec(Lifetime):
     doc: Text = Field(default="", description="Description, in one sentence")
 
 
+@dataclass(frozen=True, slots=True)
+class CaseOf:
+    """What a field is a case of.
+
+    Attributes:
+        slot: name of the choice.
+        name: name of the case.
+        named: values with a case of their own, None if there is a case for all others.
+    """
+
+    slot: str
+    name: str
+    named: tuple[Wanted, ...] | None
+
+
 class FieldSpec(Fact, Lifetime):
     """A field of a message, or a named type that fields can have."""
 
@@ -123,10 +140,62 @@ class FieldSpec(Fact, Lifetime):
         default=None, alias="if", description="Present only where earlier fields have these values"
     )
     optional: StrictBool = Field(default=False, description="May be left out, with all fields after it")
+    _case: CaseOf | None = PrivateAttr(default=None)
+
+    @property
+    def case(self) -> CaseOf | None:
+        """What it is a case of, None for other fields."""
+        return self._case
+
+    def as_case(self, case: CaseOf, when: TestText) -> FieldSpec:
+        """The field as a case of a choice, present where a condition holds."""
+        found = self.model_copy(update={"when": (when,)})
+        found._case = case  # noqa: SLF001 - of the same class
+        return found
 
 
 ShortField = Annotated[FieldSpec, ShortForm("type", "string")]
-Fields = dict[str, ShortField]
+
+
+def _case_form(value: object) -> str:
+    field = isinstance(value, str | FieldSpec) or (isinstance(value, dict) and "type" in value)
+    return f"{BRANCH}type" if field else f"{BRANCH}fields"
+
+
+#: What a choice is in one case: a type, or a record of these fields; {} for nothing.
+CaseSpec = Annotated[
+    Annotated[ShortField, Tag(f"{BRANCH}type")] | Annotated[dict[str, ShortField], Tag(f"{BRANCH}fields")],
+    Discriminator(_case_form),
+]
+
+
+class ChoiceSpec(Fact, Lifetime):
+    """A field whose type an earlier field decides."""
+
+    switch: str = Field(description="Earlier field, or bits of one, that decides")
+    cases: dict[str, CaseSpec] = Field(
+        min_length=1,
+        description="Type by value: a number, a range first..last, or a name; fields for a record of them",
+    )
+    default: CaseSpec | None = Field(default=None, description="Its type for all other values")
+
+
+def _field_form(value: object) -> str:
+    choice = isinstance(value, ChoiceSpec) or (isinstance(value, dict) and "switch" in value)
+    return f"{BRANCH}choice" if choice else f"{BRANCH}plain"
+
+
+if TYPE_CHECKING:
+    #: `without_choices` replaces each choice by its cases as soon as a file has been read.
+    Fields = dict[str, FieldSpec]
+else:
+    Fields = dict[
+        str,
+        Annotated[
+            Annotated[ShortField, Tag(f"{BRANCH}plain")] | Annotated[ChoiceSpec, Tag(f"{BRANCH}choice")],
+            Discriminator(_field_form),
+        ],
+    ]
 
 
 class RecordSpec(Fact):

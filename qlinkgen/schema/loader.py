@@ -27,6 +27,7 @@ from qlinkgen.schema.report import Reporter, did_you_mean
 from qlinkgen.schema.seeds import check_references, check_types
 from qlinkgen.schema.source import Data, parse
 from qlinkgen.schema.structure import check_structure
+from qlinkgen.schema.switches import without_choices
 from qlinkgen.schema.terminators import check_terminator
 from qlinkgen.schema.types import TypeBuilder
 from qlinkgen.schema.unconfirmed import report_unconfirmed
@@ -141,6 +142,7 @@ def _build(
     whole = check_structure(data, report)
     if whole is None:
         return None
+    whole = without_choices(whole, report)
     check_lifetimes(whole, report)
     file = in_version(whole, version)
     text += f"\nversion {version}" if version else ""

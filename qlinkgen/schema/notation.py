@@ -286,14 +286,15 @@ def _test(name: str, value: object) -> TestText:
     items = given if isinstance(given, list) else [given]
     if not items:
         raise ValueError(f"{name} has no values; write at least one")
-    return TestText(name, tuple(map(_wanted, items)), negated)
+    return TestText(name, tuple(map(wanted, items)), negated)
 
 
-def _wanted(value: object) -> Wanted:
+def wanted(value: object) -> Wanted:
+    """``3``, ``1..5``, ``true``, or the name of a member of an enum. Raises ValueError."""
     if isinstance(value, bool):
         return Wanted(shown(value), first=int(value), last=int(value), truth=True)
     if isinstance(value, str) and value in ("true", "false"):
-        return _wanted(value == "true")
+        return wanted(value == "true")
     try:
         found = range_of(value)
     except ValueError:

@@ -27,6 +27,17 @@ class Reporter:
         self._tainted: set[Path] = set()
         self._around: set[Path] = set()
         self._parents: set[Path] = set()
+        self._moved: dict[Path, Path] = {}
+
+    def move(self, path: Path, written: Path) -> None:
+        """Note where something is written that has been given another path."""
+        self._moved[path] = written
+
+    def _position(self, path: Path, *, of_key: bool) -> Position:
+        ends = range(len(path), 0, -1) if self._moved else ()
+        end = next((end for end in ends if path[:end] in self._moved), None)
+        written = path if end is None else (*self._moved[path[:end]], *path[end:])
+        return self.source.position(written, of_key=of_key)
 
     def error(
         self,
@@ -52,7 +63,7 @@ class Reporter:
         """
         needs = needs if needs is not None else () if absent else (path,)
         if not (absent and self.incomplete(path)) and not any(self.touched(need) for need in needs):
-            self.at(rule, self.source.position(path, of_key=of_key), message, hint)
+            self.at(rule, self._position(path, of_key=of_key), message, hint)
 
     def at(self, rule: str, position: Position, message: str, hint: str = "") -> None:
         """Report a fault at a position, even in a tainted node."""
@@ -66,7 +77,7 @@ class Reporter:
 
     def included(self, path: Path) -> bool:
         """Whether a node is in another file."""
-        return bool(self.source.position(path, of_key=True).file)
+        return bool(self._position(path, of_key=True).file)
 
     def taint(self, path: Path) -> None:
         """Suppress later errors derived from this path or from nodes inside it."""

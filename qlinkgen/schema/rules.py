@@ -159,6 +159,12 @@ _ALL = (
         "the same roles; what a part counts, covers or equals is there wherever the part is.",
     ),
     Rule(
+        "bad-switch",
+        "The cases of a choice exclude each other, and there is one for every value of an earlier field.",
+        "Encoders and receivers choose the case by that field, which is always present: a whole number, an "
+        "enum or a bool. `default` is the case of all other values; {} is one without a value.",
+    ),
+    Rule(
         "bad-record",
         "A record has a fixed size and at least one value.",
         "Arrays of it are divided by that size. Give its fields a number of items, like [4]; a text of "

@@ -58,6 +58,10 @@ def check_separator(message: Message, frame: Frame, path: Path, report: Reporter
 
 def _checked(field: Field, separator: bytes, excluded: bytes, path: Path, report: Reporter) -> Field:
     kind = field.type
+    if field.slot:
+        what = f"{field.slot} is a choice between separators"
+        report.error(_RULE, path, what, "use a message for each case", of_key=True)
+        return field
     if isinstance(kind, Blob) and kind.text and not kind.pad:
         if field.optional and not kind.length.minimum:
             what = f"an empty {field.name} is the same as an absent one"

@@ -16,7 +16,7 @@ from pydantic_core import ErrorDetails
 
 from qlinkgen.schema.characters import CONTROL_CHARACTER, HINT
 from qlinkgen.schema.file_base import BRANCH
-from qlinkgen.schema.file_fields import FieldSpec
+from qlinkgen.schema.file_fields import ChoiceSpec, FieldSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -83,10 +83,19 @@ class _Round:
             "missing-key", path[:-1], f"key '{key}' is missing", _purpose(path), of_key=True, needs=()
         )
 
+    def _keys_at(self, path: Path) -> list[str]:
+        """Keys that a mapping may have."""
+        if "cases" in path:
+            return _keys_at((*path[: path.index("cases")],))
+        mapping = _at(self._data, path)
+        if _is_field(path) and isinstance(mapping, dict) and "switch" in mapping:
+            return list(ChoiceSpec.model_fields)
+        return _keys_at(path)
+
     def _meant(self, parent: Path) -> set[str]:
         """Keys of a mapping of which unknown keys are probably misspellings."""
         unknown = [path for detail, path in self._details if detail["type"] == "extra_forbidden"]
-        known = _keys_at(parent)
+        known = self._keys_at(parent)
         words = [str(path[-1]) for path in unknown if path[:-1] == parent]
         hints = [key_hint(word, known, field=False) or did_you_mean(word, known) for word in words]
         meant = {hint.partition(":")[0] for hint in hints}
@@ -95,7 +104,7 @@ class _Round:
     def _wrong(self, detail: ErrorDetails, path: Path) -> None:
         kind, seen = detail["type"], detail["input"]
         if kind == "extra_forbidden":
-            key, known = str(path[-1]), _keys_at(path[:-1])
+            key, known = str(path[-1]), self._keys_at(path[:-1])
             hint = key_hint(key, known, field=_is_field(path[:-1]))
             hint = hint or did_you_mean(key, known, f"known here: {listed(known)}")
             self._report.error("unknown-key", path, f"unknown key {shown(key)}", hint, of_key=True, needs=())

@@ -66,7 +66,7 @@ class _Source:
         for value in message.values:
             if told := _presence(message, value):
                 self._add(f'    printf(" %d", m->{told} ? 1 : 0);')
-            self._add(*(f"    {line}" for line in _printed(value, "m->")))
+            self._add(*(f"    {line}" for line in _guarded(message, value, "m->", _printed(value, "m->"))))
         self._add("}")
 
     def _encode(self, message: Message) -> None:
@@ -91,7 +91,7 @@ class _Source:
         for value in message.values:
             if told := _presence(message, value):
                 self._add(f"    m.{told} = strtoul(word(), NULL, 0) != 0ul;")
-            self._add(*(f"    {line}" for line in _parsed(value, "m.")))
+            self._add(*(f"    {line}" for line in _guarded(message, value, "m.", _parsed(value, "m."))))
         call = "&m, " if has_struct else ""
         if message.fields:
             self._add(
@@ -348,12 +348,45 @@ class _Source:
 def _presence(message: Message, value: Value) -> str:
     """The member that tells whether the field of a value is present, before its first value."""
     first = next(each for each in message.values if each.field is value.field)
-    return f"has_{value.field.name}" if value.field.conditional and first == value else ""
+    return f"has_{value.field.name}" if _is_optional(value) and first == value else ""
+
+
+def _is_optional(value: Value) -> bool:
+    return value.field.conditional and not value.field.slot
+
+
+def _guarded(message: Message, value: Value, owner: str, lines: list[str]) -> list[str]:
+    """The statements for a value; those of a case only where the tested number selects it."""
+    if not value.field.slot:
+        return lines
+    (test,) = value.field.when
+    kind = next(each.type for each in message.values if each.name == test.value)
+    cast, end = (
+        ("(long long)", "ll") if isinstance(kind, Scalar) and kind.signed else ("(unsigned long long)", "ull")
+    )
+    number = f"{cast}{owner}{naming.member(test.value)}"
+    ranges = [f"({number} >= {low}{end} && {number} <= {high}{end})" for low, high in test.ranges]
+    return [f"if ({'!' if test.negated else ''}({' || '.join(ranges)})) {{", *lines, "}"]
+
+
+def _member(value: Value) -> str:
+    """The path of a member: a case is one of a union."""
+    if not value.field.slot:
+        return naming.member(value.name)
+    counted = isinstance(value.type, Array | Blob | Records) and not value.type.length.fixed
+    return f"{naming.member(value.name)}.{naming.member(value.field.case)}{'.items' if counted else ''}"
+
+
+def _count(value: Value) -> str:
+    """The path of the member that counts the items of a value."""
+    if not value.field.slot:
+        return count_member(value.field)
+    return f"{naming.member(value.name)}.{naming.member(value.field.case)}.{value.field.quantity}"
 
 
 def _parsed(value: Value, owner: str, depth: int = 0) -> list[str]:
     """Statements that set a member of a struct from words; `owner` ends in a dot."""
-    kind, name = value.type, naming.member(value.name)
+    kind, name = value.type, _member(value)
     if isinstance(kind, Record):
         return [line for each in kind.layout.values for line in _parsed(each, f"{owner}{name}.", depth)]
     if isinstance(kind, Records):
@@ -361,9 +394,7 @@ def _parsed(value: Value, owner: str, depth: int = 0) -> list[str]:
         place = f"{owner}{name}[{index} < {most}u ? {index} : 0u]."
         inner = [line for each in kind.layout.values for line in _parsed(each, place, depth + 1)]
         count_type = "uint8_t" if most < 256 else "uint16_t"
-        counted = (
-            [] if kind.length.fixed else [f"{owner}{count_member(value.field)} = ({count_type})count{depth};"]
-        )
+        counted = [] if kind.length.fixed else [f"{owner}{_count(value)} = ({count_type})count{depth};"]
         return [
             "{", f"size_t count{depth} = (size_t)strtoul(word(), NULL, 0);", *counted,
             f"for (size_t {index} = 0u; {index} < count{depth}; ++{index}) {{", *inner, "}", "}",
@@ -384,9 +415,7 @@ def _parsed(value: Value, owner: str, depth: int = 0) -> list[str]:
             f"           count < sizeof {owner}{name} ? count : sizeof {owner}{name});",
         ]
         lines += (
-            [f"    {owner}{count_member(value.field)} = ({count_type})count;"]
-            if count_type
-            else ["    (void)count;"]
+            [f"    {owner}{_count(value)} = ({count_type})count;"] if count_type else ["    (void)count;"]
         )
         return [*lines, "}"]
     number = "strtoll" if kind.item.signed else "strtoull"
@@ -406,21 +435,17 @@ def _parsed(value: Value, owner: str, depth: int = 0) -> list[str]:
         "        }",
     ]
     lines += ["        ++count;", "        if (*text == ',') { ++text; }", "    }"]
-    lines += (
-        [f"    {owner}{count_member(value.field)} = ({count_type})count;"]
-        if count_type
-        else ["    (void)count;"]
-    )
+    lines += [f"    {owner}{_count(value)} = ({count_type})count;"] if count_type else ["    (void)count;"]
     return [*lines, "}"]
 
 
 def _printed(value: Value, owner: str, depth: int = 0) -> list[str]:
-    kind, name = value.type, naming.member(value.name)
+    kind, name = value.type, _member(value)
     if isinstance(kind, Record):
         return [line for each in kind.layout.values for line in _printed(each, f"{owner}{name}.", depth)]
     if isinstance(kind, Records):
         index, fixed = f"at{depth}", f"{kind.length.maximum}u"
-        count = fixed if kind.length.fixed else f"{owner}{count_member(value.field)}"
+        count = fixed if kind.length.fixed else f"{owner}{_count(value)}"
         place = f"{owner}{name}[{index}]."
         inner = [line for each in kind.layout.values for line in _printed(each, place, depth + 1)]
         return [
@@ -433,7 +458,7 @@ def _printed(value: Value, owner: str, depth: int = 0) -> list[str]:
     if isinstance(kind, Scalar):
         form, cast = ("%lld", "long long") if kind.signed else ("%llu", "unsigned long long")
         return [f'printf(" {form}", ({cast}){owner}{name});']
-    count = f"{kind.length.maximum}u" if kind.length.fixed else f"{owner}{count_member(value.field)}"
+    count = f"{kind.length.maximum}u" if kind.length.fixed else f"{owner}{_count(value)}"
     if isinstance(kind, Blob):
         return [f"put_hex({owner}{name}, {count});"]
     assert isinstance(kind, Array)

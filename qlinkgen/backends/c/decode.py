@@ -8,9 +8,9 @@ from typing import assert_never
 from qlinkgen.backends.c import checks
 from qlinkgen.backends.c.encode import item_offset, loop, wide_bytes
 from qlinkgen.backends.c.layout import pointer
+from qlinkgen.backends.c.members import count_of, member_of
 from qlinkgen.backends.c.names import count_type, grouped, unsigned, unsigned_type
 from qlinkgen.backends.c.sizes import Learner, index_of, local, size_text, term_text
-from qlinkgen.model import naming
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.expr import Within
@@ -114,7 +114,7 @@ class Decoder(Learner):
     # Values
 
     def _read(self, step: Step) -> None:
-        target = f"message->{naming.member(step.name)}"
+        target = f"message->{member_of(step)}"
         match step:
             case ValueStep():
                 self._assign(target, step.number, self._get(step.place, step.integer))
@@ -195,7 +195,7 @@ class Decoder(Learner):
         mask = unsigned((1 << member.bits) - 1, bits, hexadecimal=True)
         raw = f"({f'(bits >> {member.shift})' if member.shift else 'bits'} & {mask})"
         kind = "" if member.number.meaning == "bool" else f"({unsigned_type(member.bits)})"
-        self._assign(f"message->{naming.member(member.name)}", member.number, f"{kind}{raw}")
+        self._assign(f"message->{member_of(member)}", member.number, f"{kind}{raw}")
 
     def _number_of(self, run: RunStep) -> str:
         """The number of items; if it varies, it is stored in the message."""
@@ -203,5 +203,5 @@ class Decoder(Learner):
         if run.fixed:
             return f"{run.length.maximum}U"
         kind, number = count_type(run.length.maximum), local(run.name)
-        self.lines.append(f"message->{run.name}_{run.quantity} = ({kind}){number};")
+        self.lines.append(f"message->{count_of(run)} = ({kind}){number};")
         return number

@@ -8,10 +8,10 @@ from typing import assert_never
 
 from qlinkgen.backends.c import checks
 from qlinkgen.backends.c.layout import Layouts, pointer
+from qlinkgen.backends.c.members import count_of, member_of
 from qlinkgen.backends.c.names import count_type, unsigned, unsigned_type
 from qlinkgen.backends.c.sizes import index_of, local, local_size, size_text, term_text
 from qlinkgen.model.integer import BitOrder, Integer, packed_size
-from qlinkgen.model.naming import member as member_of
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.expr import Within
 from qlinkgen.plan.payload import (
@@ -46,7 +46,7 @@ class Encoder:
         """Lines of the function body, without the last one."""
         for run in self.payload.runs:
             kind = count_type(run.length.maximum)
-            self.lines.append(f"const {kind} {local(run.name)} = message->{run.name}_{run.quantity};")
+            self.lines.append(f"const {kind} {local(run.name)} = message->{count_of(run)};")
         size = f"{self.payload.most}U"
         if not self.payload.fixed:
             self.lines += [f"const size_t size = {size_text(self.payload.size, local_size)};", ""]
@@ -88,17 +88,17 @@ class Encoder:
                     self._check_value(member)
             case BytesStep():
                 if step.text:
-                    octets = f"message->{member_of(step.name)}"
+                    octets = f"message->{member_of(step)}"
                     text = f"{self.layouts.prefix}_is_text_({octets}, {self._number_of(step)})"
                     self._refuse([f"!{text}"], "RANGE")
             case ItemsStep():
-                terms = checks.refused_before_sending(step.number, f"message->{member_of(step.name)}[index]")
+                terms = checks.refused_before_sending(step.number, f"message->{member_of(step)}[index]")
                 refusal = checks.refusal(terms, f"{self.layouts.prefix.upper()}_ERROR_RANGE")
                 self.lines += self._loop(step, refusal) if refusal else []
             case RecordStep():
-                self.lines += self._checked(step.record, f"message->{member_of(step.name)}")
+                self.lines += self._checked(step.record, f"message->{member_of(step)}")
             case RecordsStep():
-                refusal = self._checked(step.record, f"message->{member_of(step.name)}[index]")
+                refusal = self._checked(step.record, f"message->{member_of(step)}[index]")
                 self.lines += self._loop(step, refusal) if refusal else []
             case ConstantStep() | ReservedStep() | CountStep():
                 pass
@@ -106,9 +106,7 @@ class Encoder:
                 assert_never(step)
 
     def _check_value(self, value: ValueStep | Member) -> None:
-        self._refuse(
-            checks.refused_before_sending(value.number, f"message->{member_of(value.name)}"), "RANGE"
-        )
+        self._refuse(checks.refused_before_sending(value.number, f"message->{member_of(value)}"), "RANGE")
 
     def _checked(self, record: RecordPlan, value: str) -> list[str]:
         """The statement that checks a record; empty if all its values are legal."""
@@ -126,7 +124,7 @@ class Encoder:
                 self._put(
                     step.place,
                     step.integer,
-                    checks.as_unsigned(step.number, f"message->{member_of(step.name)}"),
+                    checks.as_unsigned(step.number, f"message->{member_of(step)}"),
                 )
             case ConstantStep() | ReservedStep():
                 self._write_fixed(step)
@@ -141,22 +139,20 @@ class Encoder:
                 self._put(step.place, step.integer, _whole(step))
             case BytesStep():
                 index = index_of(step.place, local_size, "index")
-                self.lines += self._loop(
-                    step, [f"payload[{index}] = message->{member_of(step.name)}[index];"]
-                )
+                self.lines += self._loop(step, [f"payload[{index}] = message->{member_of(step)}[index];"])
             case ItemsStep() if step.packed:
                 self._write_row(step, step.packed)
             case ItemsStep():
-                item = checks.as_unsigned(step.number, f"message->{member_of(step.name)}[index]")
+                item = checks.as_unsigned(step.number, f"message->{member_of(step)}[index]")
                 index = index_of(step.place, local_size, item_offset(step))
                 self.lines += self._loop(step, [self.layouts.put(step.item, "payload", index, item)])
             case RecordStep():
                 place = pointer("payload", index_of(step.place, local_size))
-                name = member_of(step.name)
+                name = member_of(step)
                 self.lines.append(f"{self._put_record(step.record)}(&message->{name}, {place});")
             case RecordsStep():
                 place = pointer("payload", index_of(step.place, local_size, item_offset(step)))
-                name = member_of(step.name)
+                name = member_of(step)
                 call = f"{self._put_record(step.record)}(&message->{name}[index], {place});"
                 self.lines += self._loop(step, [call])
             case _:
@@ -179,7 +175,7 @@ class Encoder:
         place = index_of(step.place, local_size)
         octet = index_of(step.place, local_size, "index")
         self.lines += loop(size, [f"payload[{octet}] = 0U;"])
-        item = checks.as_unsigned(step.number, f"message->{member_of(step.name)}[index]")
+        item = checks.as_unsigned(step.number, f"message->{member_of(step)}[index]")
         put = self.layouts.put_row(step.item, order, pointer("payload", place), "index", item)
         self.lines += self._loop(step, [put])
 
@@ -214,9 +210,7 @@ def loop(count: str, body: list[str], kind: str = "size_t") -> list[str]:
 def _whole(step: BitsStep) -> str:
     """The integer composed of its members."""
     bits = step.integer.bits
-    terms = [
-        _in_place(each.number, each.shift, f"message->{member_of(each.name)}", bits) for each in step.members
-    ]
+    terms = [_in_place(each.number, each.shift, f"message->{member_of(each)}", bits) for each in step.members]
     return terms[0] if len(terms) == 1 else f"({unsigned_type(bits)})({' | '.join(terms)})"
 
 

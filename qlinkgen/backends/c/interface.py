@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from qlinkgen.backends.c.conditions import condition, numbers_of
 from qlinkgen.backends.c.dispatch import callback_name, handler_name
 from qlinkgen.backends.c.frames import frame_section
 from qlinkgen.backends.c.layout import Layouts
+from qlinkgen.backends.c.members import count_of, member_of
 from qlinkgen.backends.c.names import Names, count_type, scalar_type, storage, unsigned_type
 from qlinkgen.backends.c.types import Types
+from qlinkgen.model import naming
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan import plan_of
+from qlinkgen.plan.payload import Holder, PayloadPlan, Presence, RunStep
 
 __all__ = ["Interface", "count_member", "interface"]
 
@@ -96,6 +100,23 @@ class Interface:
     def width(self, scalar: Scalar) -> int:
         """Size of the struct member of an integer."""
         return 1 if scalar_type(scalar) == "bool" else storage(scalar.bits) // 8
+
+    @staticmethod
+    def member(step: Holder) -> str:
+        """The path of the struct member of a value."""
+        return member_of(step)
+
+    @staticmethod
+    def counting(run: RunStep) -> str:
+        """The path of the struct member with the number of items of a run of variable size."""
+        return count_of(run)
+
+    @staticmethod
+    def test(payload: PayloadPlan, presence: Presence, inside: str) -> str:
+        """The expression that is true if a struct has a field; ``inside`` precedes its members."""
+        return condition(
+            presence.when, numbers_of(payload), lambda name: f"message->{inside}{naming.member(name)}"
+        )
 
     def count_width(self, most: int) -> int:
         """Size of the struct member that counts up to ``most``."""

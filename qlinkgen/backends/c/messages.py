@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
@@ -13,6 +13,7 @@ from qlinkgen.backends.c.describe import field_rows, member_note, message_head, 
 from qlinkgen.backends.c.encode import Encoder
 from qlinkgen.backends.c.framing import is_trimmed, struct_parameter
 from qlinkgen.backends.c.layout import Layouts
+from qlinkgen.backends.c.members import is_counted
 from qlinkgen.backends.c.names import Names, count_type, is_wide, scalar_literal, unsigned
 from qlinkgen.backends.c.types import Kind, Types
 from qlinkgen.backends.c.walked import WalkedDecoder, WalkedEncoder, size_lines
@@ -30,6 +31,9 @@ from qlinkgen.plan.payload import (
     RunStep,
     ValueStep,
     all_records,
+    by_slot,
+    first_case,
+    value_name,
 )
 from qlinkgen.plan.planning import record_plan
 from qlinkgen.plan.tree import MessagePlan
@@ -116,7 +120,7 @@ class MessageWriter:
         message, payload = plan.message, plan.payload
         head = message_head(self._names.command_of(message), message)
         values = zip(message.values, payload.settable, strict=True)
-        notes = {value.name: member_note(value, step) for value, step in values}
+        notes = {step.name: member_note(value, step) for value, step in values}
         members = self._struct(payload, notes)
         shape = payload, tuple(member.declaration for member in members)
         return MessageView(
@@ -159,27 +163,32 @@ class MessageWriter:
     def _struct(self, payload: PayloadPlan, notes: Mapping[str, str]) -> list[StructMember]:
         """The members of a struct; one more tells whether a field that may be absent is present."""
         members: list[StructMember] = []
-        for before, each in self._with_presence(payload):
-            if before is not None:
-                note = c_text.comment_line(f"whether {before.field} is present")
-                members.append(StructMember(f"bool has_{before.field};", note))
+        last: Presence | None = None
+        for slot in by_slot(payload.settable):
+            (each, *_), presence = slot, slot[0].presence
+            if presence is not None and presence.slot:
+                members += self._union(slot, notes)
+                continue
+            if presence is not None and presence != last:
+                note = c_text.comment_line(f"whether {presence.field} is present")
+                members.append(StructMember(f"bool has_{presence.field};", note))
             members += self._members(each, notes[each.name])
+            last = presence
         return members
 
     def _initialisers(self, payload: PayloadPlan) -> str:
         found: list[str] = []
-        for before, each in self._with_presence(payload):
-            found += [str(before.given).lower()] if before is not None else []
+        last: Presence | None = None
+        for slot in by_slot(payload.settable):
+            each = first_case(slot)
+            if each.presence is not None and each.presence.slot:
+                inside = self._initialiser(each)
+                found.append(f"{{{{{inside}}}}}" if is_counted(each) else f"{{{inside}}}")
+                continue
+            found += [str(each.presence.given).lower()] if each.presence and each.presence != last else []
             found.append(self._initialiser(each))
-        return ", ".join(found)
-
-    @staticmethod
-    def _with_presence(payload: PayloadPlan) -> Iterator[tuple[Presence | None, Holder]]:
-        """Each value, with what decides about its field if it is the first of it."""
-        last = None
-        for each in payload.settable:
-            yield each.presence if each.presence != last else None, each
             last = each.presence
+        return ", ".join(found)
 
     def _measure(self, payload: PayloadPlan, same: str) -> list[str]:
         if not payload.walked or not payload.settable:
@@ -246,7 +255,7 @@ class MessageWriter:
     def record(self, layout: Layout, plans: Sequence[MessagePlan]) -> RecordView:
         """The view of a record of some messages."""
         payload = record_plan(layout).payload
-        notes = {v.name: member_note(v, s) for v, s in zip(layout.values, payload.settable, strict=True)}
+        notes = {s.name: member_note(v, s) for v, s in zip(layout.values, payload.settable, strict=True)}
         function = self._layouts.records[layout.name]
         used = [each for each in plans if layout.name in {r.name for r in each.payload.records}]
         encoded, decoded = any(each.encoded for each in used), any(each.decoded for each in used)
@@ -296,20 +305,63 @@ class MessageWriter:
         return f"{self._layouts.records[each.record.name].upper()}_INIT"
 
     def _members(self, each: Holder, note: str) -> list[StructMember]:
+        """The lines of a value; a run of variable size has two."""
+        value = StructMember(f"{self._declared(each, naming.member(each.name))};", note)
+        if not isinstance(each, RunStep) or each.fixed:
+            return [value]
+        number = f"{count_type(each.length.maximum)} {each.name}_{each.quantity};"
+        return [StructMember(number, f"{_items_word(each)} in {each.name}"), value]
+
+    def _case(self, each: Holder, note: str) -> list[StructMember]:
+        """The lines of a member of a union."""
+        assert each.presence is not None
+        name = naming.member(each.presence.case)
+        if not isinstance(each, RunStep) or each.fixed:
+            return [StructMember(f"{self._declared(each, name)};", note)]
+        number = f"{count_type(each.length.maximum)} {each.quantity};"
+        inside = [StructMember(number, ""), StructMember(f"{self._declared(each, 'items')};", note)]
+        return [StructMember("struct {", ""), *_deeper(inside), StructMember(f"}} {name};", "")]
+
+    def _union(self, cases: Sequence[Holder], notes: Mapping[str, str]) -> list[StructMember]:
+        """The lines of a choice: the usual case is the first, which INIT sets."""
+        usual = first_case(cases)
+        ordered = (usual, *(each for each in cases if each is not usual))
+        inside = [member for each in ordered for member in self._case(each, notes[each.name])]
+        return [
+            StructMember("union {", ""),
+            *_deeper(inside),
+            StructMember(f"}} {naming.member(value_name(usual))};", ""),
+        ]
+
+    def _declared(self, each: Holder, name: str) -> str:
+        """The declaration of a value."""
+        many = f"[{each.length.maximum}]" if isinstance(each, RunStep) else ""
         match each:
-            case ValueStep() | Member():
-                return [StructMember(f"{self._types.of(each.number)} {naming.member(each.name)};", note)]
+            case ValueStep() | Member() | ItemsStep():
+                kind = self._types.of(each.number)
             case BytesStep():
-                return _run_members(each, "uint8_t", "bytes", note)
-            case ItemsStep():
-                return _run_members(each, self._types.of(each.number), "items", note)
-            case RecordStep():
+                kind = "uint8_t"
+            case RecordStep() | RecordsStep():
                 kind = f"{self._layouts.records[each.record.name]}_t"
-                return [StructMember(f"{kind} {naming.member(each.name)};", note)]
-            case RecordsStep():
-                return _run_members(each, f"{self._layouts.records[each.record.name]}_t", "records", note)
             case _:
                 assert_never(each)
+        return f"{kind} {name}{many}"
+
+
+def _items_word(run: RunStep) -> str:
+    match run:
+        case BytesStep():
+            return "bytes"
+        case ItemsStep():
+            return "items"
+        case RecordsStep():
+            return "records"
+        case _:
+            assert_never(run)
+
+
+def _deeper(members: Iterable[StructMember]) -> list[StructMember]:
+    return [StructMember(f"    {each.declaration}", each.note) for each in members]
 
 
 def trimming(most: str, keep: int) -> list[str]:
@@ -320,15 +372,6 @@ def trimming(most: str, keep: int) -> list[str]:
         f"while ({inside}(payload[size - 1U] == 0U)) {{",
         "    --size;",
         "}",
-    ]
-
-
-def _run_members(run: RunStep, item: str, what: str, note: str) -> list[StructMember]:
-    most = run.length.maximum
-    number = StructMember(f"{count_type(most)} {run.name}_{run.quantity};", f"{what} in {run.name}")
-    return [
-        *([] if run.fixed else [number]),
-        StructMember(f"{item} {naming.member(run.name)}[{most}];", note),
     ]
 
 

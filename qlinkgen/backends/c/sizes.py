@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from qlinkgen.backends.c.checks import broken, refusal
 from qlinkgen.backends.c.layout import Layouts
+from qlinkgen.backends.c.members import count_of
 from qlinkgen.backends.c.names import Names, grouped
 from qlinkgen.backends.c.walked_size import walked_size_lines
 from qlinkgen.model.message import Message
@@ -41,7 +42,7 @@ def _items_text(term: Term, size: str) -> str:
 def size_terms(message: Message, struct: str) -> str:
     """The size of a payload as an expression; ``struct`` is the prefix of its counts."""
     plan = payload_plan(message)
-    members = {run.name: f"(size_t){struct}{run.name}_{run.quantity}" for run in plan.runs}
+    members = {run.name: f"(size_t){struct}{count_of(run)}" for run in plan.runs}
     return size_text(plan.size, members.__getitem__)
 
 

@@ -9,6 +9,7 @@ from qlinkgen.backends.c import checks
 from qlinkgen.backends.c.conditions import condition, numbers_of
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.encode import Encoder
+from qlinkgen.backends.c.members import count_of
 from qlinkgen.backends.c.names import count_type, grouped
 from qlinkgen.backends.c.sizes import local, local_size, size_text, term_text
 from qlinkgen.model import naming
@@ -20,7 +21,7 @@ from qlinkgen.plan.payload import CountStep, PayloadPlan, Presence, RunStep, Seg
 def has_member(segment: Segment) -> str:
     """The struct member that tells whether a segment is present, "" if it has none."""
     presence = segment.presence
-    return f"has_{presence.field}" if presence and holders(segment.steps) else ""
+    return f"has_{presence.field}" if presence and not presence.slot and holders(segment.steps) else ""
 
 
 def _in_struct(name: str) -> str:
@@ -43,7 +44,7 @@ def size_lines(payload: PayloadPlan) -> list[str]:
 def _struct_size(segment: Segment) -> str:
     run = segment.run
     assert run is not None
-    count = f"(size_t)message->{run.name}_{run.quantity}"
+    count = f"(size_t)message->{count_of(run)}"
     return f"{run.item_size}U * {count}" if run.item_size > 1 else count
 
 
@@ -74,7 +75,13 @@ class WalkedEncoder(Encoder):
         lines: list[str] = []
         for run in self.payload.runs:
             kind = count_type(run.length.maximum)
-            lines.append(f"const {kind} {local(run.name)} = message->{run.name}_{run.quantity};")
+            # A member of a union is read only where its case is sent.
+            case = run.presence is not None and run.presence.slot
+            lines.append(
+                f"{kind} {local(run.name)} = 0U;"
+                if case
+                else f"const {kind} {local(run.name)} = message->{count_of(run)};"
+            )
         lines += [f"const size_t size = {self.function}_size_(message);", ""]
         lines += self._checks()
         self._refuse(["capacity < size"], "CAPACITY")
@@ -98,6 +105,8 @@ class WalkedEncoder(Encoder):
         for segment in self.payload.segments:
             run = segment.run
             if run is not None:
+                if run.presence is not None and run.presence.slot:
+                    self.lines.append(f"{local(run.name)} = message->{count_of(run)};")
                 held = Within(0, (1 << int(count_type(run.length.maximum)[4:-2])) - 1)
                 bounds = self.payload.sendable(run)
                 self._refuse(checks.broken([bounds], local(run.name), held, 16), "LENGTH")

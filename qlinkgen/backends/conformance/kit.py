@@ -43,7 +43,8 @@ class KitView:
 
     Attributes:
         place_type: holds the offsets of struct members; 16 bits if possible, for small targets.
-        has_records: the struct of a message has records.
+        has_records: the struct of a message has records, or choices.
+        has_choices: a message has a value whose type another value decides.
         empty_wires: a response is empty: without payload, frame and check value.
     """
 
@@ -67,6 +68,7 @@ class KitView:
     size_bytes: int
     place_type: str
     has_records: bool
+    has_choices: bool
     id_type: str
     number_type: str
     member_type: str
@@ -116,7 +118,8 @@ class Kit:
         tests = bool(check) + sum(each.tests + each.handler_tests + each.callback_tests for each in entries)
         most_wire = max(len(row.wire) for row in self._every)
         members = max(len(each.members) for each in entries)
-        records = any(each.payload.records for each in self._plan.messages)
+        choices = any(each.cases for each in entries)
+        records = choices or any(each.payload.records for each in self._plan.messages)
         values = max(most_values(header, held(each)) for each in self._plan.messages)
         printed = max(tests, most_wire, (1 << header.address_bits) - 1)
         return KitView(
@@ -141,6 +144,7 @@ class Kit:
             # A number in a struct is followed by up to seven bytes of padding.
             place_type=_unsigned(8 * values if records else values + 8 * members),
             has_records=records,
+            has_choices=choices,
             id_type=_unsigned((1 << header.id_bits) - 1),
             number_type=_unsigned(tests),
             member_type="uint8_t" if members <= 0xFF else "uint16_t",

@@ -68,6 +68,7 @@ class Entry:
     is_response: bool
     has_struct: bool
     has_bytes: bool
+    cases: list[CaseView]
     members: list[str]
     encoded: bool
     decoded: bool
@@ -174,6 +175,7 @@ class Entries:
         handled, called = self._has_handler(plan), self._has_callback(plan)
         ranges = sum(isinstance(row, Wrong) and row.kind == _RANGE for row in rows)
         right = [row for row in rows if isinstance(row, Right)]
+        own = MemberRows(header, stem)
         return Entry(
             number=self._numbers[message.name],
             name=message.name,
@@ -183,7 +185,8 @@ class Entries:
             is_response=plan.direction == "response",
             has_struct=bool(message.values),
             has_bytes=bool(message.fields),
-            members=self._members(plan),
+            members=own.members(plan),
+            cases=own.cases,
             encoded=plan.encoded,
             decoded=plan.decoded,
             framed=framed,
@@ -213,50 +216,6 @@ class Entries:
         rows = self._rows[message.name]
         right = next(row for row in rows if isinstance(row, Right) and not row.decode_only)
         return list(unsent(self._header, message, right))
-
-    def _members(self, message: MessagePlan) -> list[str]:
-        values = [
-            line for _, each in message.envelope.values for line in self._member("store_t", "parts.", each)
-        ]
-        return values + self._rows_of(f"{self._header.function(message.message)}_t", "", message.payload)
-
-    def _rows_of(self, struct: str, inside: str, payload: PayloadPlan) -> list[str]:
-        """The rows of the values of a message or a record."""
-        lines: list[str] = []
-        before = presences(payload.settable)
-        for step in payload.settable:
-            if step.name in before:
-                lines.append(f"NUMBER({struct}, {inside}has_{before[step.name].field}),")
-            lines += self._member(struct, inside, step)
-        return lines
-
-    def _member(self, struct: str, inside: str, step: Holder) -> list[str]:
-        name = inside + naming.member(step.name)
-        match step:
-            case ValueStep() | Member() if step.number.bits > 64:
-                return [f"NUMBER({struct}, {name}.high),", f"NUMBER({struct}, {name}.low),"]
-            case ValueStep() | Member():
-                return [f"NUMBER({struct}, {name}),"]
-            case RecordStep():
-                return self._rows_of(struct, f"{name}.", step.record.payload)
-            case BytesStep() | ItemsStep() if step.fixed:
-                return [f"ITEMS({struct}, {name}),"]
-            case BytesStep() | ItemsStep():
-                return [
-                    f"NUMBER({struct}, {inside}{step.name}_{step.quantity}),",
-                    f"COUNTED({struct}, {name}),",
-                ]
-            case RecordsStep():
-                return self._records(struct, inside, step)
-            case _:
-                assert_never(step)
-
-    def _records(self, struct: str, inside: str, step: RecordsStep) -> list[str]:
-        record = f"{self._header.record(step.record.name)}_t"
-        rows = self._rows_of(record, "", step.record.payload)
-        name, counted = inside + naming.member(step.name), "false" if step.fixed else "true"
-        first = [] if step.fixed else [f"NUMBER({struct}, {inside}{step.name}_{step.quantity}),"]
-        return [*first, f"RECORDS({struct}, {name}, {counted}, {len(rows)}u),", *rows]
 
     # Rows
 
@@ -302,3 +261,77 @@ def _events(events: tuple[str, ...] | None) -> str:
     if events is None:
         return "NOT_FED,"
     return ", ".join([str(len(events)), *(f"E_{event.upper()}" for event in events)]) + ","
+
+
+@dataclass(frozen=True, slots=True)
+class CaseView:
+    """The function that tells whether a struct has a case of a choice."""
+
+    function: str
+    struct: str
+    test: str
+
+
+class MemberRows:
+    """The rows of the table of one struct, one for each number, run, record and case.
+
+    Attributes:
+        cases: the functions that rows of cases name; complete once the rows have been made.
+    """
+
+    def __init__(self, header: Header, stem: str) -> None:
+        """``stem`` identifies the message in names."""
+        self._header = header
+        self._stem = stem
+        self.cases: list[CaseView] = []
+
+    def members(self, message: MessagePlan) -> list[str]:
+        """The rows of a message, with the values of its frame."""
+        values = [
+            line for _, each in message.envelope.values for line in self._member("store_t", "parts.", each)
+        ]
+        return values + self._rows_of(f"{self._header.function(message.message)}_t", "", message.payload)
+
+    def _rows_of(self, struct: str, inside: str, payload: PayloadPlan) -> list[str]:
+        """The rows of the values of a message or a record."""
+        lines: list[str] = []
+        before = presences(payload.settable)
+        for step in payload.settable:
+            rows = self._member(struct, inside, step)
+            if step.name in before and before[step.name].slot:
+                test = self._header.test(payload, before[step.name], inside)
+                case = CaseView(f"{self._stem}_case_{len(self.cases) + 1}", struct, test)
+                self.cases.append(case)
+                lines.append(f"CASE({case.function}, {len(rows)}u),")
+            elif step.name in before:
+                lines.append(f"NUMBER({struct}, {inside}has_{before[step.name].field}),")
+            lines += rows
+        return lines
+
+    def _member(self, struct: str, inside: str, step: Holder) -> list[str]:
+        name = inside + self._header.member(step)
+        match step:
+            case ValueStep() | Member() if step.number.bits > 64:
+                return [f"NUMBER({struct}, {name}.high),", f"NUMBER({struct}, {name}.low),"]
+            case ValueStep() | Member():
+                return [f"NUMBER({struct}, {name}),"]
+            case RecordStep():
+                return self._rows_of(struct, f"{name}.", step.record.payload)
+            case BytesStep() | ItemsStep() if step.fixed:
+                return [f"ITEMS({struct}, {name}),"]
+            case BytesStep() | ItemsStep():
+                return [
+                    f"NUMBER({struct}, {inside}{self._header.counting(step)}),",
+                    f"COUNTED({struct}, {name}),",
+                ]
+            case RecordsStep():
+                return self._records(struct, inside, step)
+            case _:
+                assert_never(step)
+
+    def _records(self, struct: str, inside: str, step: RecordsStep) -> list[str]:
+        record = f"{self._header.record(step.record.name)}_t"
+        rows = self._rows_of(record, "", step.record.payload)
+        name, counted = inside + self._header.member(step), "false" if step.fixed else "true"
+        first = [] if step.fixed else [f"NUMBER({struct}, {inside}{self._header.counting(step)}),"]
+        return [*first, f"RECORDS({struct}, {name}, {counted}, {len(rows)}u),", *rows]

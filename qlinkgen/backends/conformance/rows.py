@@ -8,7 +8,7 @@ from decimal import Decimal
 from typing import assert_never
 
 from qlinkgen.backends.conformance.sources import Header, JsonObject, Sources
-from qlinkgen.model.fields import Record, Records, Value
+from qlinkgen.model.fields import Record, Records, Value, chosen
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.values import Native, default_of, from_json, raw_number
@@ -25,6 +25,7 @@ from qlinkgen.plan.payload import (
     RunStep,
     ValueStep,
 )
+from qlinkgen.plan.walk import present
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,8 +176,18 @@ def value_sizes(header: Header, holders: Sequence[Holder], values: bytes) -> lis
     """Size of each value in a vector."""
     sizes: list[int] = []
     before = presences(holders)
+    numbers: dict[str, int] = {}
     for step in holders:
         told = int(step.name in before)
+        if step.presence is not None and step.presence.slot:
+            told = 0
+            if not present(step.presence, numbers, 0):
+                sizes.append(0)
+                continue
+        if isinstance(step, ValueStep | Member):
+            at = sum(sizes) + told
+            raw = values[at : at + header.width(step.number)]
+            numbers[step.name] = int.from_bytes(raw, "big", signed=step.number.signed)
         match step:
             case ValueStep() | Member() | RecordStep():
                 sizes.append(told + _most(header, step))
@@ -225,7 +236,12 @@ def _values(
 ) -> bytes:
     """The values of a message or a record."""
     before, data = presences(payload.settable), b""
+    own = chosen(stated, lambda name: _number(stated, payload, name, fields, raw))
     for value, step in zip(stated, payload.settable, strict=True):
+        if value.field.slot:
+            sent = value in own and _native(value, fields) is not None
+            data += _value(header, value, step, fields, raw.get(value.name)) if sent else b""
+            continue
         absent = step.presence is not None and _native(value, fields) is None
         data += bytes((not absent,)) if value.name in before else b""
         if absent:
@@ -233,6 +249,17 @@ def _values(
         else:
             data += _value(header, value, step, fields, raw.get(value.name))
     return data
+
+
+def _number(
+    stated: Sequence[Value], payload: PayloadPlan, name: str, fields: JsonObject, raw: JsonObject
+) -> int:
+    """A raw number."""
+    pairs = zip(stated, payload.settable, strict=True)
+    value, step = next((value, step) for value, step in pairs if value.name == name)
+    assert isinstance(step, ValueStep | Member)
+    given = raw.get(name)
+    return given if isinstance(given, int) else raw_number(name, step.number, _native(value, fields))
 
 
 def _always(value: Value) -> Value:

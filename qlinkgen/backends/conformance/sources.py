@@ -9,6 +9,7 @@ from typing import Any
 
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.types import Scalar
+from qlinkgen.plan.payload import Holder, PayloadPlan, Presence, RunStep
 
 #: A document of vectors or one line of it. Any: the entries depend on the message.
 JsonObject = Mapping[str, Any]
@@ -102,6 +103,18 @@ class Header(typing.Protocol):
 
     def width(self, scalar: Scalar) -> int:
         """Size of the struct member of an integer."""
+        ...
+
+    def member(self, step: Holder) -> str:
+        """The path of the struct member of a value."""
+        ...
+
+    def counting(self, run: RunStep) -> str:
+        """The path of the struct member with the number of items of a run of variable size."""
+        ...
+
+    def test(self, payload: PayloadPlan, presence: Presence, inside: str) -> str:
+        """The expression that is true if a struct has a field; ``inside`` precedes its members."""
         ...
 
     def count_width(self, most: int) -> int:

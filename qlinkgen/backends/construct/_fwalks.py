@@ -38,18 +38,34 @@ class Walked(Message):
         message_id: int,
         *fields: Renamed,
         presence: Sequence[Presence] = (),
+        choices: Sequence[tuple[str, Sequence[str]]] = (),
+        most: int = 0,
         **settings: Any,
     ) -> None:
         # Any: the settings of a Message.
         super().__init__(name, message_id, *fields, **settings)
+        #: The value of which a field is a case.
+        self.slots = {case: slot for slot, cases in choices for case in cases}
         self.presence = {field: tests for field, tests, _ in presence}
         self.tested = {test[0] for _, tests, _ in presence for test in tests}
         absent = {field for field, _, given in presence if not given}
         for field in fields:
             if field.name in absent:
                 self.defaults.update(dict.fromkeys(_values(field)))
+        self.defaults = self._by_value(self.defaults)
         always = [field for field in fields if field.name not in self.presence]
         self.least = sum(self._least(field) for field in always)
+        #: Some fields exclude each other.
+        self.most = most or self.most
+
+    def _by_value(self, found: Mapping[str, Any]) -> dict[str, Any]:
+        """Values by field with one for each choice, that of the case which is present."""
+        values: dict[str, Any] = {}
+        for name, value in found.items():
+            slot = self.slots.get(name, name)
+            if values.get(slot) is None:
+                values[slot] = value
+        return values
 
     def _least(self, field: Renamed) -> int:
         run = self.runs.get(field.name)
@@ -155,7 +171,7 @@ class Walked(Message):
                 at += len(cell)
         if at != len(data):
             raise RangeError(f"{len(data) - at} bytes follow {self.name}", path=path)
-        return values
+        return Container(self._by_value(values)) if self.slots else values
 
     def _infer(
         self, field: Renamed, counts: dict[str, int], left: int, path: str
@@ -187,7 +203,11 @@ class Walked(Message):
         values.update(obj)
         numbers: dict[str, int] = {}
         left_out = False
+        sent: set[str] = set()
         for field in self.fields:
+            if field.name in self.slots:
+                sent |= self._case(field, values, numbers, stream, path)
+                continue
             given = [values[name] is not None for name in _values(field)]
             present = self._present(field, numbers, 0)
             if self.presence.get(field.name) == ():
@@ -202,13 +222,33 @@ class Walked(Message):
                 cell = self._cell(field, values, path)
                 self._note(field, cell, numbers)
                 stream_write(stream, cell, len(cell), path)
+        for slot in self.slots.values():
+            if slot not in sent and values[slot] is not None:
+                raise ValidationError(f"{slot} must be absent here", path=path)
         return obj
+
+    def _case(
+        self,
+        field: Renamed,
+        values: Container,
+        numbers: Mapping[str, int],
+        stream: BinaryIO,
+        path: str,
+    ) -> set[str]:
+        """Send the value of a choice if this is its case; the name of the value if it is."""
+        if not self._present(field, numbers, 0):
+            return set()
+        slot = self.slots[field.name]
+        if values[slot] is None:
+            raise ValidationError(f"{slot} is missing", path=path)
+        cell = self._cell(field, values, path)
+        stream_write(stream, cell, len(cell), path)
+        return {slot}
 
     def _cell(self, field: Renamed, values: Container, path: str) -> bytes:
         stream = BytesIO()
-        whole = (
-            values if isinstance(field.subcon, BitFields) else values.get(field.name)
-        )
+        name = self.slots.get(field.name, field.name)
+        whole = values if isinstance(field.subcon, BitFields) else values.get(name)
         try:
             field._build(whole, stream, values, path)
         except TypeError as error:

@@ -30,7 +30,7 @@ from qlinkgen.plan.parts import (
     Part,
     PayloadPart,
 )
-from qlinkgen.plan.payload import Member, PayloadPlan, Presence
+from qlinkgen.plan.payload import Member, PayloadPlan, Presence, full_size
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -96,11 +96,21 @@ def _message(message: MessagePlan, types: Types) -> Call:
         if optional := tuple((each.field, each.given) for each in _absent(message.payload)):
             settings["optional"] = Sequence(optional)
     elif message.payload.walked:
-        settings["presence"] = Sequence(tuple(_presence(message.payload)))
+        settings |= _walking(message.payload)
     name = _class_of(message.payload)
     return Call(
         name, (message.name, hexadecimal(message.id), *fields(message, types)), tuple(settings.items())
     )
+
+
+def _walking(payload: PayloadPlan) -> dict[str, Node]:
+    """The settings of a payload in which fields may be absent."""
+    settings: dict[str, Node] = {"presence": Sequence(tuple(_presence(payload)))}
+    if payload.most < sum(map(full_size, payload.steps)):
+        settings["most"] = payload.most
+    if choices := tuple(_choices(payload)):
+        settings["choices"] = Sequence(choices)
+    return settings
 
 
 def _class_of(payload: PayloadPlan) -> str:
@@ -120,6 +130,14 @@ def _presence(payload: PayloadPlan) -> Iterator[Node]:
         if presence := segment.presence:
             tests: tuple[Node, ...] = tuple((each.value, each.ranges, each.negated) for each in presence.when)
             yield presence.field, tests, presence.given
+
+
+def _choices(payload: PayloadPlan) -> Iterator[Node]:
+    """The name of each choice, and the fields that are its cases."""
+    for _, cases in payload.by_choice:
+        presences = [each.presence for each in cases if each.presence]
+        if presences:
+            yield presences[0].slot, tuple(each.field for each in presences)
 
 
 # Frames

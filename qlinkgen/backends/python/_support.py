@@ -185,6 +185,10 @@ class Rule:
         """The value converted to the types that encoders accept, such as int."""
         return value
 
+    def of(self, message: object) -> Rule:
+        """The rule that applies to the value of a message."""
+        return self
+
     def complaint(self, value: object) -> str:
         """The error text for a value, "" if it is legal."""
         try:
@@ -468,7 +472,7 @@ def refused(message: BaseMessage) -> EncodeError:
     for rule in message.RULES:
         if rule.settable:
             value = getattr(message, rule.name, None)
-            if complaint := rule.complaint(value):
+            if complaint := rule.of(message).complaint(value):
                 return EncodeError(f"{message.NAME}: {complaint}", rule.name, value)
     return EncodeError(f"{message.NAME}: cannot be sent: {shown(message)}")
 
@@ -481,10 +485,10 @@ def settled(message: AnyMessage) -> AnyMessage:
     same, plain = True, object.__new__(type(message))
     for rule in message.RULES:
         if rule.settable:
-            value = getattr(message, rule.name, None)
-            if rule.complaint(value):
+            value, own = getattr(message, rule.name, None), rule.of(message)
+            if own.complaint(value):
                 raise refused(message) from None
-            setattr(plain, rule.name, rule.plain(value))
+            setattr(plain, rule.name, own.plain(value))
             same = same and getattr(plain, rule.name) is value
     if same:
         raise refused(message) from None

@@ -15,16 +15,17 @@ from qlinkgen.backends.base import Options, Outputs, banner
 from qlinkgen.backends.python import docstrings, package, values
 from qlinkgen.backends.python.fitted import fitted
 from qlinkgen.backends.python.layout import WIDTH, wrapped
-from qlinkgen.backends.python.names import attribute, class_name, imported
+from qlinkgen.backends.python.names import attribute, class_name, held, imported
 from qlinkgen.backends.python.place import Place, place_of
 from qlinkgen.backends.python.sections import templates
+from qlinkgen.model.fields import Value
 from qlinkgen.model.naming import file_stem, method
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import Command
 from qlinkgen.model.types import Enum
 from qlinkgen.plan import MessagePlan, Plan, plan_of
-from qlinkgen.plan.payload import BytesStep, RecordsStep, RecordStep
+from qlinkgen.plan.payload import BytesStep, Holder, RecordsStep, RecordStep, by_slot
 
 __all__ = ["generate", "render"]
 
@@ -198,7 +199,7 @@ class BusModule:
                 self._classes.add(self._place.classes[each.record.name])
             elif not isinstance(each, BytesStep) and isinstance(each.number.meaning, Enum):
                 self._classes.add(self._place.classes[each.number.meaning.name])
-        taken = [values.argument(each, self._place) for each in settable]
+        taken = [values.argument(each, self._place) for each in by_slot(settable)]
         for name, message in self._further(transaction):
             kind = self._class(message)
             taken.append(f"{name}: {kind} | Callable[[Sequence[Any]], {kind}]")
@@ -206,7 +207,7 @@ class BusModule:
 
     def _further(self, transaction: Transaction) -> list[tuple[str, MessagePlan]]:
         """Parameters for what the master sends after a request."""
-        names = {attribute(each.name) for each in transaction.request.payload.settable}
+        names = {held(each) for each in transaction.request.payload.settable}
         names |= {self._place.address}
         found = []
         for message in transaction.further:
@@ -220,7 +221,7 @@ class BusModule:
     @staticmethod
     def _given(transaction: Transaction) -> list[str]:
         """Arguments that pass the parameters on."""
-        names = (attribute(each.name) for each in transaction.request.payload.settable)
+        names = dict.fromkeys(held(each) for each in transaction.request.payload.settable)
         return [f"{name}={name}" for name in names]
 
     def _answer(self, transaction: Transaction, more: Sequence[MessagePlan], *, surely: bool = False) -> str:
@@ -307,8 +308,11 @@ class BusModule:
     def _arguments(self, call: Transaction, first: str) -> list[str]:
         """The section on arguments; ``first`` describes the one that is not a field."""
         entries = [first] if first else []
-        pairs = zip(call.request.message.values, call.request.payload.settable, strict=True)
-        entries += [f"{attribute(v.name)}: {values.description(v, each, self._place)}" for v, each in pairs]
+        pairs: dict[str, list[tuple[Value, Holder]]] = {}
+        settable = call.request.payload.settable
+        for value, each in zip(call.request.message.values, settable, strict=True):
+            pairs.setdefault(attribute(value.name), []).append((value, each))
+        entries += [f"{name}: {values.description(cases, self._place)}" for name, cases in pairs.items()]
         entries += [
             f"{name}: {class_name(message)} to send, or a function that makes it from the answers so far."
             for name, message in self._further(call)
@@ -334,7 +338,7 @@ class BusModule:
 
     def _host_callers(self, *, asynchronous: bool) -> list[Caller]:
         on_axis = [each for each in self._transactions if _axis_of(each.command) in _CHOSEN]
-        fields = {attribute(each.name) for call in on_axis for each in call.request.payload.settable}
+        fields = {held(each) for call in on_axis for each in call.request.payload.settable}
         axis = "axis" if on_axis else ""
         while axis in fields:
             axis += "_"

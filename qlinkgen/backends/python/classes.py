@@ -13,7 +13,7 @@ from qlinkgen.backends.python.encode import Encoder
 from qlinkgen.backends.python.frames import seed_name
 from qlinkgen.backends.python.layout import WIDTH, calls, in_hex, indented, listing, literal, wrapped
 from qlinkgen.backends.python.measure import measure_lines
-from qlinkgen.backends.python.names import attribute, class_name, constant_name, natural
+from qlinkgen.backends.python.names import attribute, class_name, constant_name, held, natural
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.sections import way_class
 from qlinkgen.backends.python.separated import SeparatedDecoder, SeparatedEncoder
@@ -40,6 +40,7 @@ from qlinkgen.plan.payload import (
     ReservedStep,
     Step,
     ValueStep,
+    by_slot,
 )
 from qlinkgen.plan.planning import record_plan
 from qlinkgen.plan.tree import MessagePlan, Plan
@@ -185,8 +186,8 @@ class ClassBuilder:
         decoder = make_decoder(message, place, title, scales)
         name = "" if place.envelope is None else "body"
         encode = encoder.statements(name)
-        held = (*place.beside, *message.payload.settable)
-        names = sorted((attribute(each.name) for each in held), key=natural)
+        stored = (*place.beside, *message.payload.settable)
+        names = sorted({held(each) for each in stored}, key=natural)
         return replace(
             head,
             slots=listing("__slots__ = (", [f'"{name}"' for name in names], ")", 4),
@@ -258,7 +259,7 @@ class ClassBuilder:
         address = message.message.default_address
         if message.allowed is not None and address != self._default_address:
             facts.append(f"DEFAULT_ADDRESS = {address}")
-        names = [f'"{attribute(each.name)}"' for each in payload.settable]
+        names = list(dict.fromkeys(f'"{held(each)}"' for each in payload.settable))
         facts += listing("FIELDS = (", names, ")", 4) if names else []
         rules = values.rules(message, self._within(message), scales)
         return [*facts, *calls("RULES = (", rules, ")", 4)] if rules else facts
@@ -270,10 +271,10 @@ class ClassBuilder:
         spans = {end for span in message.message.addresses for end in span}
         default = f" = {message.message.default_address}" if len(spans) == 1 else ""
         arguments = [f"{address}: int{default}"] if address else []
-        held = (*place.beside, *message.payload.settable)
-        arguments += [values.argument(each, place) for each in held]
+        slots = by_slot((*place.beside, *message.payload.settable))
+        arguments += [values.argument(each, place) for each in slots]
         body = [f"self.{address} = {address}"] if address else []
-        body += [values.assignment(each, place) for each in held]
+        body += [values.assignment(each, place) for each in slots]
         taken = ["self", "*", *arguments] if arguments else ["self"]
         return [*wrapped("def __init__(", taken, ") -> None:", 4), *indented(body or ["pass"])]
 
@@ -285,21 +286,24 @@ class ClassBuilder:
         lines = docstrings.paragraph(opening, WIDTH - 8)
         if not stated.confirmed:
             lines += ["", docstrings.UNCONFIRMED]
-        settable = {each.name: each for each in message.payload.settable}
+        settable = message.payload.settable
         if settable or message.allowed is not None:
             lines += ["", "Attributes:", *self._attributes(message, stated.values, settable)]
         return python_text.docstring(lines)
 
     def _attributes(
-        self, message: MessagePlan, stated: Iterable[Value], settable: Mapping[str, Holder]
+        self, message: MessagePlan, stated: Iterable[Value], settable: Iterable[Holder]
     ) -> list[str]:
         lines = []
         if self._place.address and message.allowed is not None:
             spans = " or ".join(values.span(each.low, each.high) for each in message.allowed.ranges)
             lines.append(f"    {self._place.address}: Address in the frame, {spans}.")
-        for value in stated:
-            text = values.description(value, settable[value.name], self._place)
-            lines += docstrings.item(f"{attribute(value.name)}: {text}", WIDTH - 4)
+        pairs: dict[str, list[tuple[Value, Holder]]] = {}
+        for value, each in zip(stated, settable, strict=True):
+            pairs.setdefault(value.name, []).append((value, each))
+        for name, cases in pairs.items():
+            text = values.description(cases, self._place)
+            lines += docstrings.item(f"{attribute(name)}: {text}", WIDTH - 4)
         return lines
 
 

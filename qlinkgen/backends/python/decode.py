@@ -8,7 +8,7 @@ from typing import assert_never
 
 from qlinkgen.backends.python import floats, integers, pieces, values
 from qlinkgen.backends.python.layout import WIDTH, indented, literal, slice_of, wrapped
-from qlinkgen.backends.python.names import attribute
+from qlinkgen.backends.python.names import held
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
 from qlinkgen.model.integer import Integer, packed_size
@@ -47,6 +47,7 @@ from qlinkgen.plan.payload import (
     Step,
     ValueStep,
     term_of,
+    value_name,
 )
 from qlinkgen.plan.tree import MessagePlan
 
@@ -405,9 +406,9 @@ class Decoder:
                 self._value(step, at)
             case ConstantStep():
                 number = self._get(step.integer, f"{step.name}_raw", at)
-                self._put_together(step.integer, number, step.name, self._offset(step))
+                self._put_together(step.integer, number, value_name(step), self._offset(step))
                 rule = Within(step.value, step.value)
-                self._refuse(integers.broken(rule, number), step.name, number, self._offset(step))
+                self._refuse(integers.broken(rule, number), value_name(step), number, self._offset(step))
             case ReservedStep():
                 self._row(at).codes.append(f"{step.integer.size}x")
             case CountStep():
@@ -439,7 +440,7 @@ class Decoder:
         self._values += [f"if {test}:", *indented(call)]
 
     def _value(self, step: ValueStep, at: Size) -> None:
-        raw, target = f"{step.name}_raw", f"message.{attribute(step.name)}"
+        raw, target = f"{step.name}_raw", f"message.{held(step)}"
         if isinstance(step.number.meaning, Float):
             self._float(step, step.number.meaning, target, at)
             return
@@ -451,9 +452,9 @@ class Decoder:
             self._get(step.integer, raw, at, target)
             return
         self._get(step.integer, raw, at)
-        self._put_together(step.integer, raw, step.name, self._offset(step))
+        self._put_together(step.integer, raw, value_name(step), self._offset(step))
         for rule in step.conditions:
-            self._refuse(integers.broken(rule, raw), step.name, raw, self._offset(step))
+            self._refuse(integers.broken(rule, raw), value_name(step), raw, self._offset(step))
         self._values += assigned(target, step.number, raw, self.scales.get(step.name, ""), self.place)
 
     def _float(self, step: ValueStep, kind: Float, target: str, at: Size) -> None:
@@ -466,7 +467,7 @@ class Decoder:
             taken = f'{self.place.use("unpack")}("{floats.format_of(kind, step.integer)}", {raw})'
             self._values.append(f"({number},) = {taken}")
         if legal:
-            self._refuse(f"not {legal[0]}", step.name, raw, self._offset(step))
+            self._refuse(f"not {legal[0]}", value_name(step), raw, self._offset(step))
             self._values.append(f"{target} = {raw}")
 
     def _count_step(self, step: CountStep, at: Size) -> None:
@@ -488,14 +489,14 @@ class Decoder:
     def _bits(self, step: BitsStep, at: Size) -> None:
         whole = f"{step.name}_whole"
         self._get(step.integer, whole, at)
-        self._put_together(step.integer, whole, step.name, self._offset(step))
+        self._put_together(step.integer, whole, value_name(step), self._offset(step))
         for member in step.members:
             mask = (1 << member.bits) - 1
             taken = f"{whole} >> {member.shift} & 0x{mask:X}" if member.shift else f"{whole} & 0x{mask:X}"
             self._member(member, taken, self._offset(step))
 
     def _member(self, member: Member, taken: str, offset: str, data: str = "") -> None:
-        raw, target = f"{member.name}_raw", f"message.{attribute(member.name)}"
+        raw, target = f"{member.name}_raw", f"message.{held(member)}"
         if member.number.signed:
             taken = integers.sign_extended(f"({taken})", member.bits)
         if _is_plain(member.number) and not member.conditions:
@@ -509,7 +510,7 @@ class Decoder:
     # Runs
 
     def _bytes(self, step: BytesStep, at: Size) -> None:
-        target = f"message.{attribute(step.name)}"
+        target = f"message.{held(step)}"
         raw = f"{step.name}_raw" if step.text or step.pad else target
         if step.fixed:
             row = self._row(at)
@@ -521,7 +522,7 @@ class Decoder:
             value = raw if step.text else target
             self._values.append(f"{value} = {raw}.rstrip({literal(step.pad)})")
         if step.text:
-            self._refuse(f"not {raw}.isascii()", step.name, raw, self._offset(step))
+            self._refuse(f"not {raw}.isascii()", value_name(step), raw, self._offset(step))
             self._values.append(f'{target} = {raw}.decode("ascii")')
 
     def _slice(self, step: RunStep, target: str) -> None:
@@ -537,7 +538,7 @@ class Decoder:
 
     def _items(self, step: ItemsStep, at: Size) -> None:
         kind, plain = step.number.meaning, _is_plain(step.number)
-        whole, target = f"message.{attribute(step.name)}", _items_of(step)
+        whole, target = f"message.{held(step)}", _items_of(step)
         code = floats.letter(step.number, step.item, self.place.byteorder)
         if step.packed:
             self._row_of_bits(step, target, at)
@@ -562,13 +563,13 @@ class Decoder:
         rules = [integers.holds(rule, "item") for rule in step.conditions]
         for rule in floats.holds(kind, "item") if isinstance(kind, Float) else rules:
             test = f"not all({rule} for item in {target})"
-            self._refuse(test, step.name, target, self._offset(step))
+            self._refuse(test, value_name(step), target, self._offset(step))
         if not plain:
             item = converted(step.number, "item", self.scales.get(step.name, ""), self.place)
             self._values.append(f"{whole} = [{item} for item in {target}]")
 
     def _records(self, step: RecordStep | RecordsStep, at: Size) -> None:
-        place, name = self.place, attribute(step.name)
+        place, name = self.place, held(step)
         given = [place.classes[step.record.name], place.data, self._from(at)]
         if isinstance(step, RecordStep):
             self._row(at).codes.append(f"{step.record.size}x")
@@ -614,7 +615,7 @@ class Decoder:
             width = number if step.fixed else f"{{{number}}}"
             back = "[::-1]" if step.packed == "least" else ""
             digits = f'f"{{{step.name}_whole:0{width}b}}"{back}[:{number}]'
-            self._values.append(f'message.{attribute(step.name)} = [digit == "1" for digit in {digits}]')
+            self._values.append(f'message.{held(step)} = [digit == "1" for digit in {digits}]')
             return
         last = str((step.length.maximum - 1) * bits) if step.fixed else f"{row_bits} - {bits}"
         starts = f"range(0, {row_bits}, {bits})" if step.packed == "least" else f"range({last}, -1, -{bits})"
@@ -634,11 +635,13 @@ class Decoder:
             self._slice(step, raw)
         places = f"for index in range(0, len({raw}), {size})"
         if item.bcd:
-            self._refuse(f"{raw} and not {raw}.hex().isdecimal()", step.name, raw, self._offset(step))
+            self._refuse(f"{raw} and not {raw}.hex().isdecimal()", value_name(step), raw, self._offset(step))
         if item.text:
             number = self._number_in(item, f"{raw}[index : index + {size}]")
             self._values.append(f"{target} = [{number} {places}]")
-            self._refuse(f"max({target}, default=0) > {item.maximum}", step.name, raw, self._offset(step))
+            self._refuse(
+                f"max({target}, default=0) > {item.maximum}", value_name(step), raw, self._offset(step)
+            )
             return
         if item.byteorder is not None:
             number = integers.from_bytes(item, f"{raw}[index : index + {size}]")
@@ -647,7 +650,7 @@ class Decoder:
             for index, chunk in enumerate(item.chunks):
                 if chunk.bits < 8:
                     seen = f"max({raw}[{index}::{size}], default=0)"
-                    self._refuse(f"{seen} > 0x{chunk.mask:02X}", step.name, raw, self._offset(step))
+                    self._refuse(f"{seen} > 0x{chunk.mask:02X}", value_name(step), raw, self._offset(step))
             number = " | ".join(integers.group_terms(item, sources))
             if item.signed:
                 number = integers.sign_extended(f"({number})", item.bits)
@@ -656,7 +659,7 @@ class Decoder:
 
 def _items_of(step: ItemsStep) -> str:
     """The variable of the items as on the wire."""
-    return f"message.{attribute(step.name)}" if _is_plain(step.number) else f"{step.name}_items"
+    return f"message.{held(step)}" if _is_plain(step.number) else f"{step.name}_items"
 
 
 def assigned(target: str, number: Scalar, raw: str, scale: str, place: Place) -> list[str]:

@@ -12,11 +12,11 @@ from qlinkgen.backends.python.layout import (
     literal,
     wrapped,
 )
-from qlinkgen.backends.python.names import attribute
+from qlinkgen.backends.python.names import attribute, source_of
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
 from qlinkgen.model.integer import Integer, packed_size
-from qlinkgen.model.types import Float, Scalar
+from qlinkgen.model.types import Float
 from qlinkgen.plan.expr import Condition, Within
 from qlinkgen.plan.parts import (
     AddressPart,
@@ -116,7 +116,7 @@ class Encoder:
 
     def _measure(self) -> None:
         for run in self.message.payload.runs:
-            source = f"self.{attribute(run.name)}"
+            source = source_of(run)
             if isinstance(run, BytesStep):
                 source = self._octets(run)
             self._lines.append(f"{run.name}_count = len({source})")
@@ -129,7 +129,7 @@ class Encoder:
 
     def _octets(self, run: BytesStep) -> str:
         """The bytes of a run as a local."""
-        source = f"self.{attribute(run.name)}"
+        source = source_of(run)
         value = f'{source}.encode("ascii")' if run.text else f"{self.place.use('as_bytes')}({source})"
         self._lines.append(f"{run.name}_raw = {value}")
         return f"{run.name}_raw"
@@ -262,7 +262,7 @@ class Encoder:
                 self._items(step)
             case RecordStep():
                 name = self.place.classes[step.record.name]
-                self._add(f"{step.record.size}s", f"{name}.to_bytes(self.{attribute(step.name)})")
+                self._add(f"{step.record.size}s", f"{name}.to_bytes({source_of(step)})")
             case RecordsStep():
                 self._records(step)
             case _:
@@ -285,7 +285,7 @@ class Encoder:
         self._integer(integer, f"{name}_raw")
 
     def _value(self, step: ValueStep) -> None:
-        source, plain = f"self.{attribute(step.name)}", integers.letter(step.integer, self.place.byteorder)
+        source, plain = source_of(step), integers.letter(step.integer, self.place.byteorder)
         if isinstance(step.number.meaning, Float):
             self._float(step, step.number.meaning, source)
         elif step.number.scaling is not None:
@@ -295,7 +295,7 @@ class Encoder:
             self._require(source, *step.conditions)
             self._integer(step.integer, source)
         else:
-            self._indexed(step.name, step.number)
+            self._indexed(step)
             self._integer(step.integer, f"{step.name}_raw")
 
     def _float(self, step: ValueStep, kind: Float, source: str) -> None:
@@ -307,10 +307,10 @@ class Encoder:
             form = floats.format_of(kind, step.integer)
             self._add(f"{step.integer.size}s", f'{self.place.use("pack")}("{form}", {source})')
 
-    def _indexed(self, name: str, number: Scalar) -> None:
+    def _indexed(self, each: ValueStep | Member) -> None:
         """Assign a value to a local as an int, and check its range."""
-        self._lines.append(f"{name}_raw = {self.place.use('index')}(self.{attribute(name)})")
-        self._require(f"{name}_raw", *limits(number))
+        self._lines.append(f"{each.name}_raw = {self.place.use('index')}({source_of(each)})")
+        self._require(f"{each.name}_raw", *limits(each.number))
 
     def _bits(self, step: BitsStep) -> None:
         terms = list(map(self._member, step.members)) or ["0"]
@@ -323,10 +323,10 @@ class Encoder:
     def _member(self, member: Member) -> str:
         number = f"{member.name}_raw"
         if member.number.scaling is not None:
-            source = f"self.{attribute(member.name)}"
+            source = source_of(member)
             self._lines.append(f"{number} = {self.scales[member.name]}.raw({source})")
         else:
-            self._indexed(member.name, member.number)
+            self._indexed(member)
         if member.number.signed:
             number = f"{number} & 0x{(1 << member.bits) - 1:X}"
             number = f"({number})" if member.shift else number
@@ -345,7 +345,7 @@ class Encoder:
             self._pieces.append(f"{step.name}_raw")
 
     def _items(self, step: ItemsStep) -> None:
-        source, kind = f"self.{attribute(step.name)}", step.number.meaning
+        source, kind = source_of(step), step.number.meaning
         code = floats.letter(step.number, step.item, self.place.byteorder)
         if step.fixed:
             self._terms.append(f"len({source}) == {step.length.maximum}")
@@ -434,7 +434,7 @@ class Encoder:
         self._pieces.append(f'b"".join({octets})')
 
     def _records(self, step: RecordsStep) -> None:
-        name, source = self.place.classes[step.record.name], f"self.{attribute(step.name)}"
+        name, source = self.place.classes[step.record.name], source_of(step)
         octets = f'b"".join([{name}.to_bytes(each) for each in {source}])'
         if step.fixed:
             self._terms.append(f"len({source}) == {step.length.maximum}")

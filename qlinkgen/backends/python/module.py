@@ -33,6 +33,7 @@ _RECORD = "BaseRecord"
 _SHARED: Mapping[str, Sequence[str]] = {
     "_checks": ("Checksum", "adler", "crc", "find_crc", "fletcher", "sum_of", "wrong_check", "xor_of"),
     "_digits": ("BetweenRule", "decimal", "read_decimal", "read_hexadecimal", "start_of"),
+    "_rchoices": ("ChoiceRule",),
     "_records": (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records"),
     "_rules": ("FloatRule", "ListRule", "PaddedRule"),
     "_rwalks": ("MaybeRule", "Misplaced", "NEW", "misplaced"),
@@ -186,6 +187,7 @@ class Module:
         typing = {"ClassVar", "Literal", "Self"}
         typing |= {"Final"} if plan.flags else set()
         view = views[-1]
+        typing |= {"Any"} if "ChoiceRule" in used else set()
         check = None if isinstance(view, PacketView) else view.check
         if check is not None:
             used |= {"Checksum", "wrong_check", check.maker}

@@ -12,10 +12,21 @@ from collections.abc import Mapping
 from qlinkgen.model import naming
 from qlinkgen.model.fields import Layout
 from qlinkgen.model.types import Enum, Flags
+from qlinkgen.plan.payload import Holder, Step, value_name
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 #: The attribute of a field.
 attribute = naming.attribute
+
+
+def held(each: Holder | Step) -> str:
+    """The attribute that holds the value of a field."""
+    return attribute(value_name(each))
+
+
+def source_of(each: Holder | Step) -> str:
+    """The expression for a value to encode: a choice is a local, which has no type."""
+    return f"{value_name(each)}_whole" if each.presence and each.presence.slot else f"self.{held(each)}"
 
 
 def class_name(message: MessagePlan) -> str:

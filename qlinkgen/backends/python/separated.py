@@ -61,7 +61,7 @@ class SeparatedEncoder(WalkedEncoder):
                 if step.number.scaling is not None:
                     self._lines.append(f"{raw} = {self.scales[step.name]}.raw({source})")
                 else:
-                    self._indexed(step.name, step.number)
+                    self._indexed(step)
                 self._use_text(step.integer)
                 text = integers.text_of(_digits(step.integer), raw)
             case _:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from typing import assert_never
 
 from qlinkgen.backends import python_text
 from qlinkgen.backends.python.layout import Call, literal
-from qlinkgen.backends.python.names import attribute
+from qlinkgen.backends.python.names import attribute, held
 from qlinkgen.backends.python.place import Place
+from qlinkgen.model.condition import Test
 from qlinkgen.model.message import Value
 from qlinkgen.model.types import Enum, Flags, Float, Scalar
 from qlinkgen.model.values import Native, native_from_raw
@@ -23,22 +24,27 @@ from qlinkgen.plan.payload import (
     ItemsStep,
     Member,
     PayloadPlan,
+    Presence,
     RecordPlan,
     RecordsStep,
     RecordStep,
     ReservedStep,
     Step,
     ValueStep,
+    first_case,
     holders,
     is_required,
 )
 from qlinkgen.plan.tree import MessagePlan
 
+#: The steps with one value: the cases of a choice, or a single one.
+Slot = Sequence[Holder]
 
-def annotation(each: Holder, place: Place) -> str:
+
+def annotation(slot: Slot, place: Place) -> str:
     """Type of the attribute."""
-    kind = _annotation(each, place)
-    return f"{kind} | None" if each.presence is not None else kind
+    kinds = dict.fromkeys(part for each in slot for part in _annotation(each, place).split(" | "))
+    return " | ".join((*kinds, "None") if slot[0].presence is not None else kinds)
 
 
 def _annotation(each: Holder, place: Place) -> str:
@@ -69,9 +75,10 @@ def _number_type(number: Scalar, place: Place) -> str:
             assert_never(number.meaning)
 
 
-def argument(each: Holder, place: Place) -> str:
+def argument(slot: Slot, place: Place) -> str:
     """Parameter of a function for the value, with its default if it has one."""
-    kind, name = annotation(each, place), attribute(each.name)
+    each = first_case(slot)
+    kind, name = annotation(slot, place), held(each)
     if is_required(each):
         return f"{name}: {kind}"
     if each.presence is not None and not each.presence.given:
@@ -83,9 +90,10 @@ def argument(each: Holder, place: Place) -> str:
     return f"{name}: {kind} = {default(each, place)}"
 
 
-def assignment(each: Holder, place: Place) -> str:
+def assignment(slot: Slot, place: Place) -> str:
     """The statement that stores an argument; each message gets a new list or record as a default."""
-    name = attribute(each.name)
+    each = first_case(slot)
+    name = held(each)
     if each.presence is not None:
         new = each.presence.given and isinstance(each, ItemsStep | RecordStep | RecordsStep)
         return (
@@ -172,9 +180,26 @@ def rules(message: MessagePlan, place: Place, scales: Mapping[str, str]) -> list
         found.append(_rule(place, "IntRule", place.address, *bounds))
     for member in place.beside:
         found += _member_rules(member, place, scales)
+    choices: dict[str, list[tuple[Presence, Call]]] = {}
     for step in message.payload.steps:
-        found += _rules(step, place, scales)
-    return found
+        rules = _rules(step, place, scales)
+        if step.presence is None or not step.presence.slot:
+            found += rules
+            continue
+        if step.presence.slot not in choices:
+            found.append(Call("", [step.presence.slot]))
+        choices.setdefault(step.presence.slot, []).append((step.presence, rules[0]))
+    return [each if each.name else _choice_rule(choices[each.arguments[0]], place) for each in found]
+
+
+def _choice_rule(cases: Sequence[tuple[Presence, Call]], place: Place) -> Call:
+    """The rule of a choice: that of the case which the tested value selects."""
+    first = cases[0][0]
+    given = [f'"{attribute(first.slot)}"', f'"{attribute(first.when[0].value)}"']
+    for presence, rule in cases:
+        (test,) = presence.when
+        given.append(f"({test.ranges!r}, {test.negated}, {rule.flat})")
+    return Call(place.use("ChoiceRule"), given)
 
 
 def _rule(place: Place, kind: str, name: str, *arguments: object, unit: str = "") -> Call:
@@ -185,9 +210,9 @@ def _rule(place: Place, kind: str, name: str, *arguments: object, unit: str = ""
 def _rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Call]:
     """The rules of a step."""
     rules = _plain_rules(step, place, scales)
-    settable = {attribute(each.name) for each in holders((step,))}
-    if step.presence is None:
+    if step.presence is None or step.presence.slot:
         return rules
+    settable = {held(each) for each in holders((step,))}
     return [_maybe(each, place) if each.arguments[0].strip('"') in settable else each for each in rules]
 
 
@@ -196,7 +221,7 @@ def _maybe(rule: Call, place: Place) -> Call:
 
 
 def _plain_rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Call]:
-    name = attribute(step.name)
+    name = held(step)
     match step:
         case ConstantStep():
             return [_rule(place, "ConstantRule", name, step.value)]
@@ -211,12 +236,12 @@ def _plain_rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Ca
         case ItemsStep():
             length, item = step.length, step.number
             if not _is_whole(item):
-                inner = _number_rule(step.name, item, place, scales)
+                inner = _number_rule(name, item, place, scales, step.name)
                 return [Call(place.use("ListRule"), [str(length.minimum), str(length.maximum), inner.flat])]
             bounds = (length.minimum, length.maximum, item.minimum, item.maximum)
             return [_rule(place, "ArrayRule", name, *bounds, unit=item.unit)]
         case ValueStep():
-            return [_number_rule(step.name, step.number, place, scales)]
+            return [_number_rule(name, step.number, place, scales, step.name)]
         case RecordStep() | RecordsStep():
             return [_record_rule(step, place)]
         case _:
@@ -232,7 +257,7 @@ def _octets_rule(step: BytesStep, place: Place) -> Call:
 
 
 def _record_rule(step: RecordStep | RecordsStep, place: Place) -> Call:
-    name, kind = attribute(step.name), place.classes[step.record.name]
+    name, kind = held(step), place.classes[step.record.name]
     if isinstance(step, RecordStep):
         return _rule(place, "RecordRule", name, kind)
     return _rule(place, "RecordsRule", name, kind, step.length.minimum, step.length.maximum)
@@ -252,11 +277,11 @@ def _is_whole(number: Scalar) -> bool:
 
 
 def _member_rules(member: Member, place: Place, scales: Mapping[str, str]) -> list[Call]:
-    return [_number_rule(member.name, member.number, place, scales)]
+    return [_number_rule(attribute(member.name), member.number, place, scales, member.name)]
 
 
-def _number_rule(field: str, number: Scalar, place: Place, scales: Mapping[str, str]) -> Call:
-    name = attribute(field)
+def _number_rule(name: str, number: Scalar, place: Place, scales: Mapping[str, str], field: str) -> Call:
+    """The rule of an attribute for the number of a field."""
     if number.scaling is not None:
         return _rule(place, "ScaledRule", name, scales[field], unit=number.unit)
     match number.meaning:
@@ -273,16 +298,41 @@ def _number_rule(field: str, number: Scalar, place: Place, scales: Mapping[str, 
 # Descriptions
 
 
-def description(value: Value, each: Holder, place: Place) -> str:
-    """Description, range and unit of a value, and whether its source is weak, as one paragraph."""
+def description(cases: Sequence[tuple[Value, Holder]], place: Place) -> str:
+    """Description, range and unit of a value, and whether its source is weak, as one paragraph.
+
+    ``cases`` are those of a choice, or the value alone.
+    """
+    (value, each), *_ = cases
     text = value.doc.rstrip(".")
     facts = [_facts(each, place)]
+    if value.field.slot:
+        facts = [_case_text(each, place) for _, each in cases]
     if value.field.section:
         facts.append(f"section {value.field.section}")
     if not value.field.confirmed:
         facts.append("UNCONFIRMED: check it on the device")
     detail = "; ".join(fact for fact in facts if fact)
     return f"{text}; {detail}." if text and detail else f"{text or detail}."
+
+
+def _case_text(each: Holder, place: Place) -> str:
+    """What a choice is in one case."""
+    assert each.presence is not None
+    where = "otherwise" if each.presence.when[0].negated else f"where {condition_text(each.presence)}"
+    return f"{_facts(each, place) or 'a number'} {where}"
+
+
+def condition_text(presence: Presence) -> str:
+    """What decides whether a field is present, in words."""
+    if presence.optional:
+        return "all fields before it are given"
+    return " and ".join(_test_text(test) for test in presence.when)
+
+
+def _test_text(test: Test) -> str:
+    ranges = (str(low) if low == high else f"{low}..{high}" for low, high in test.ranges)
+    return f"{attribute(test.value)} is {'not ' if test.negated else ''}{' or '.join(ranges)}"
 
 
 def _facts(each: Holder, place: Place) -> str:

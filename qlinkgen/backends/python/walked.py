@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from qlinkgen.backends.python import integers
 from qlinkgen.backends.python.decode import Decoder, assigned_targets, divided
 from qlinkgen.backends.python.encode import Encoder, Row
-from qlinkgen.backends.python.layout import indented
-from qlinkgen.backends.python.names import attribute
+from qlinkgen.backends.python.layout import bare, indented
+from qlinkgen.backends.python.names import attribute, held, source_of
 from qlinkgen.backends.python.structs import format_of
+from qlinkgen.backends.python.values import condition_text
 from qlinkgen.model.condition import Test
 from qlinkgen.model.integer import Integer
 from qlinkgen.plan.expr import OneOf, Size, Within
@@ -21,10 +22,12 @@ from qlinkgen.plan.payload import (
     CountStep,
     PayloadPlan,
     Presence,
+    RecordStep,
     RunStep,
     Segment,
     Step,
     ValueStep,
+    complete,
     holders,
 )
 
@@ -32,24 +35,12 @@ from qlinkgen.plan.payload import (
 def condition(tests: Sequence[Test], number: str) -> str:
     """The expression of a condition; ``number`` is the format of the name of a value."""
     terms = [_test(each, number.format(each.value)) for each in tests]
-    return " and ".join(terms) if len(terms) > 1 else terms[0].removeprefix("(").removesuffix(")")
+    return " and ".join(terms) if len(terms) > 1 else bare(terms[0])
 
 
 def _test(test: Test, number: str) -> str:
     rule = OneOf(tuple(Within(*each) for each in test.ranges))
     return integers.broken(rule, number) if test.negated else integers.holds(rule, number)
-
-
-def condition_text(presence: Presence) -> str:
-    """What decides whether a field is present, in words."""
-    if presence.optional:
-        return "all fields before it are given"
-    return " and ".join(_test_text(test) for test in presence.when)
-
-
-def _test_text(test: Test) -> str:
-    ranges = (str(low) if low == high else f"{low}..{high}" for low, high in test.ranges)
-    return f"{attribute(test.value)} is {'not ' if test.negated else ''}{' or '.join(ranges)}"
 
 
 @dataclass
@@ -61,10 +52,14 @@ class WalkedEncoder(Encoder):
     def statements(self, name: str) -> list[str]:
         """Statements that assign the bytes to the local ``name``, or return them if it is empty."""
         self._tabled = None
-        lines = [line for run in self.message.payload.runs for line in self._counted(run)]
+        runs = (run for run in self.message.payload.runs if not (run.presence and run.presence.slot))
+        lines = [line for run in runs for line in self._counted(run)]
         lines.append('data = b""')
         before = ""
-        for segment in self.message.payload.segments:
+        for segment, cases in self.message.payload.by_choice:
+            if cases:
+                lines += self._choice(cases)
+                continue
             lines += self._segment(segment, before)
             if segment.presence is not None and segment.presence.optional:
                 # The bits of an integer have values of their own, which are given or absent together.
@@ -81,16 +76,16 @@ class WalkedEncoder(Encoder):
 
     def _counted(self, run: RunStep) -> list[str]:
         """The statements that count a run, and check its number of items."""
-        source = f"self.{attribute(run.name)}"
+        source = source_of(run)
         if isinstance(run, BytesStep):
             source = self._octets(run)
         self._lines.append(f"{run.name}_count = len({source})")
         bounds = Within(run.length.minimum, run.length.maximum)
         self._terms.append(integers.holds(bounds, f"{run.name}_count"))
         lines = self._flushed()
-        if run.presence is None:
+        if run.presence is None or run.presence.slot:
             return lines
-        given = f"if self.{attribute(run.name)} is not None:"
+        given = f"if self.{held(run)} is not None:"
         return [f"{run.name}_count = 0", given, *indented(lines)]
 
     def _segment(self, segment: Segment, before: str) -> list[str]:
@@ -100,7 +95,7 @@ class WalkedEncoder(Encoder):
         presence = segment.presence
         if presence is None:
             return lines
-        values = [attribute(each.name) for each in holders(segment.steps)]
+        values = [held(each) for each in holders(segment.steps)]
         if presence.optional:
             given = f"if self.{values[0]} is not None:"
             skipped = (
@@ -109,15 +104,47 @@ class WalkedEncoder(Encoder):
                 else []
             )
             return [given, *indented([*skipped, *lines])]
-        missing = [line for each in values for line in self._misplaced(presence, each, "is None")]
-        surplus = [line for each in values for line in self._misplaced(presence, each, "is not None")]
+        missing = [
+            line for each in values for line in self._misplaced(presence, each, f"self.{each} is None")
+        ]
+        surplus = [
+            line for each in values for line in self._misplaced(presence, each, f"self.{each} is not None")
+        ]
         test = condition([_python(each) for each in presence.when], "self.{}")
         found = [f"if {test}:", *indented([*missing, *lines])]
         return [*found, "else:", *indented(surplus)] if surplus else found
 
+    def _choice(self, cases: Sequence[Segment]) -> list[str]:
+        """The statements of the cases of a choice."""
+        first = cases[0].steps[0]
+        lines, word = [f"{source_of(first)}: Any = self.{held(first)}"], "if"
+        for segment in cases:
+            (step,), presence = segment.steps, segment.presence
+            assert presence is not None
+            body = self._misplaced(presence, held(step), self._unfit(step))
+            body += [] if segment.run is None else self._counted(segment.run)
+            self._step(step)
+            test = condition([_python(each) for each in presence.when], "self.{}")
+            lines += [f"{word} {test}:", *indented([*body, *self._flushed()])]
+            word = "elif"
+        if not complete(cases):
+            given = f'self, "{held(first)}", "{_tested(cases)} is that of a case with a value"'
+            lines += [
+                f"elif {source_of(first)} is not None:",
+                f"    raise {self.place.use('misplaced')}({given})",
+            ]
+        return lines
+
+    def _unfit(self, step: Step) -> str:
+        """The test for a value that cannot be that of the case; struct finds most of the others."""
+        name = source_of(step)
+        if isinstance(step, RecordStep):
+            return f"not isinstance({name}, {self.place.classes[step.record.name]})"
+        return f"{name} is None"
+
     def _misplaced(self, presence: Presence, value: str, wrong: str) -> list[str]:
-        """Refuse a value that is ``wrong``, "is None" or "is not None"."""
-        return [f"if self.{value} {wrong}:", *self._raised(presence, value)]
+        """Refuse a value if a test holds."""
+        return [f"if {wrong}:", *self._raised(presence, value)]
 
     def _raised(self, presence: Presence, value: str) -> list[str]:
         given = f'self, "{value}", "{condition_text(presence)}"'
@@ -170,8 +197,8 @@ class WalkedDecoder(Decoder):
         end = f"len({place.data}) - {place.trailer}" if place.trailer else f"len({place.data})"
         lines += [f"at = {place.header}", f"end = {end}"]
         self._walking = True
-        for segment in self.message.payload.segments:
-            lines += self._segment(segment)
+        for segment, cases in self.message.payload.by_choice:
+            lines += self._choice(cases) if cases else self._segment(segment)
         lines += ["if at != end:", self._bad_layout]
         at = Size()
         for part in self._needed_back():
@@ -189,14 +216,24 @@ class WalkedDecoder(Decoder):
             self._step(step)
         lines += [*self._flushed(), f"at += {size}"]
         presence = segment.presence
-        if presence is None:
+        if presence is None or presence.slot:
             return lines
         test = "at < end"
         if not presence.optional:
             test = condition([_python(each) for each in presence.when], "message.{}")
-        absent = [f"message.{attribute(each.name)} = None" for each in holders(segment.steps)]
+        absent = [f"message.{held(each)} = None" for each in holders(segment.steps)]
         found = [f"if {test}:", *indented(lines)]
         return [*found, "else:", *indented(absent)] if absent else found
+
+    def _choice(self, cases: Sequence[Segment]) -> list[str]:
+        """The statements of the cases of a choice."""
+        lines, word = list[str](), "if"
+        for segment in cases:
+            assert segment.presence is not None
+            test = condition([_python(each) for each in segment.presence.when], "message.{}")
+            lines += [f"{word} {test}:", *indented(self._segment(segment))]
+            word = "elif"
+        return [*lines, "else:", f"    message.{held(cases[0].steps[0])} = None"]
 
     def _measured(self, run: RunStep, segment: Segment) -> list[str]:
         """The statements that count a run which takes the rest."""
@@ -242,6 +279,13 @@ class WalkedDecoder(Decoder):
         self._counted_runs.add(step.run)
         own = integers.own_bytes(step.term, number)
         self._values += divided(run, own, step.scale, self._bad_layout)
+
+
+def _tested(cases: Sequence[Segment]) -> str:
+    """The attribute that selects a case."""
+    presence = cases[0].presence
+    assert presence is not None
+    return attribute(presence.when[0].value)
 
 
 def _times(run: RunStep) -> str:

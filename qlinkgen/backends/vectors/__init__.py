@@ -13,6 +13,7 @@ from qlinkgen.backends.vectors import choice, writer
 from qlinkgen.backends.vectors.choice import Chance
 from qlinkgen.backends.vectors.faults import Faults, Good
 from qlinkgen.backends.vectors.writer import Json
+from qlinkgen.model.fields import chosen
 from qlinkgen.model.message import Direction, Example
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
@@ -140,8 +141,9 @@ def _shown(good: Good) -> Mapping[str, Json]:
     """Decoded values, and raw integers where they differ."""
     fields: dict[str, Json] = {}
     raw: dict[str, Json] = {}
-    for value, step in zip(good.message.message.values, good.message.payload.settable, strict=True):
-        number = good.values[value.name]
+    pairs = dict(zip(good.message.message.values, good.message.payload.settable, strict=True))
+    for value in chosen(pairs, good.values.get):
+        step, number = pairs[value], good.values[value.name]
         shown = fields[value.name] = to_json(value, native_of(step, number))
         if isinstance(step, RecordStep | RecordsStep):
             if _has_other_raws(step.record.payload):

@@ -8,7 +8,7 @@ from typing import assert_never
 
 from qlinkgen.model.integer import Integer, unpack_chunks
 from qlinkgen.model.types import Float, Length, Scalar
-from qlinkgen.plan.content import Raw, broken, default_of
+from qlinkgen.plan.content import Raw, broken, by_value, default_of
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import Clear
 from qlinkgen.plan.payload import (
@@ -83,7 +83,7 @@ class Rule:
                     found |= {each.name: None for each in holders((step,))}
                     continue
             found |= self._of(step)
-        return found
+        return by_value(plan, found)
 
     def beside(self, envelope: Envelope) -> dict[str, Raw]:
         """The raw values of a frame."""
@@ -194,7 +194,7 @@ def random(chance: Chance) -> Rule:
 
 def defaults(plan: PayloadPlan) -> dict[str, Raw]:
     """Default values; required items have the default of an item."""
-    return {each.name: _default(each) for each in plan.settable}
+    return by_value(plan, {each.name: _default(each) for each in plan.settable})
 
 
 def _default(each: Holder) -> Raw:

@@ -64,6 +64,8 @@ class FieldMaker:
     structured: float = 0.12
     #: Fraction of messages in which fields may be absent.
     conditional: float = 0.25
+    #: Fraction of messages with a choice.
+    choosing: float = 0.15
 
     def types(self) -> Doc:
         """Enums, flags and named types."""
@@ -174,7 +176,82 @@ class FieldMaker:
             self._add_conditions(made, set(begun or {}), taken)
         self._count_several(made)
         self._name_sizes(made)
-        return dict(self._dated(made, taken))
+        dated = self._dated(made, taken)
+        if not fixed and not room.least and self.rng.random() < self.choosing:
+            self._add_choice(dated, taken, room)
+        return dict(dated)
+
+    def _add_choice(self, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
+        """A value whose type an earlier field decides, at the end of the payload."""
+        rng = self.rng
+        specs = [spec for _, spec in made if isinstance(spec, dict)]
+        if any(self._is_open(each, made) for _, each in made) or any("optional" in each for each in specs):
+            return
+        if any("packed" in spec and ".." in spec["type"] for spec in specs):
+            return
+        tag, size, ref, low, high = self._tag(taken)
+        room.left -= size
+        cases: Doc = {}
+        middle = (low + high) // 2
+        keys = rng.choice(
+            (
+                [low],
+                [low, high],
+                [low, f"{low + 1}..{middle}", high],
+                [f"{low}..{middle}", f"{middle + 1}..{high}"],
+            )
+        )
+        if high - low < 3:
+            keys = [low]
+        most = 0
+        for key in keys:
+            case, size = self._case(room)
+            if size > room.left:
+                return
+            cases[str(key)] = case
+            most = max(most, size)
+        spec: Doc = {"switch": ref, "cases": cases}
+        covered = len(keys) == 2 and isinstance(keys[0], str)
+        if not covered:
+            spec["default"] = {} if rng.random() < 0.3 else self._case(room, last=room.open_end)[0]
+        if not any(cases.values()) and not spec.get("default"):
+            return
+        made.insert(rng.randint(0, len(made)), tag)
+        made.append((self.words.name(taken), spec))
+
+    def _tag(self, taken: set[str]) -> tuple[tuple[str, Any], int, str, int, int]:
+        """A field that a choice may test: itself, its size, the reference, and its range."""
+        rng, name = self.rng, self.words.name(taken)
+        roll = rng.random()
+        if roll < 0.3 and not self.shape.groups:
+            bit = self.words.name(taken)
+            return (name, {"type": "u8", "bits": {bit: "2..4"}}), 1, rng.choice((bit, f"{name}.{bit}")), 0, 7
+        if roll < 0.4:
+            return (name, "bool"), 1, name, 0, 1
+        kind = "u8" if self.shape.groups or roll < 0.8 else rng.choice(("u16", "i8"))
+        return (name, {"type": kind, "range": "0..9"}), self._bytes_of(kind, {}), name, 0, 9
+
+    def _case(self, room: Room, *, last: bool = False) -> tuple[Any, int]:
+        """What a choice is in one case, and its size."""
+        rng, roll = self.rng, self.rng.random()
+        if last and roll < 0.5 and room.left > 8:
+            most = rng.choice((3, room.left))
+            return (f"text[0..{most}]" if self.shape.groups else f"bytes[0..{most}]"), most
+        if roll < 0.1:
+            return {}, 0
+        if self.records and roll < 0.2:
+            return self._of_record()
+        if roll < 0.4:
+            taken = set[str]()
+            parts = [(self.words.name(taken), self._plain()) for _ in range(rng.choice((1, 2, 3)))]
+            return {name: spec for name, (spec, _) in parts}, sum(size for _, (_, size) in parts)
+        if roll < 0.5:
+            return self._fixed_run()
+        while True:
+            spec, size = self._scalar()
+            written = self._merged({"type": spec} if isinstance(spec, str) else spec)
+            if {"const", "reserved", "bits", "counts"}.isdisjoint(written):
+                return spec, size
 
     def texts(self, room: Room) -> Doc:
         """The fields of a message between separators; any may be empty that is optional."""

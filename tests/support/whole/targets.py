@@ -31,7 +31,7 @@ from tests.support.whole.reference.document import Message, Number, Record, Reco
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.special import Packets
 from tests.support.whole.reference.values import decode as decode_payload
-from tests.support.whole.reference.values import default
+from tests.support.whole.reference.values import default, holds
 
 _EXACT = Context(prec=200)
 
@@ -76,11 +76,22 @@ class Target:
 
     def natives(self, message: Message, given: Mapping[str, Raw]) -> dict[str, Any]:
         """Values of the Python API."""
-        return {name: native(kind, given[name]) for name, kind in message.values()}
+        return message.by_name({name: native(kind, given[name]) for name, kind in message.values()})
 
     def raws(self, message: Message, found: Callable[[str], Any]) -> dict[str, Raw]:
         """Raw values from values of the Python API."""
-        return {name: raw_of(kind, found(name)) for name, kind in message.values()}
+        return by_case(message, lambda name, kind: raw_of(kind, found(name)))
+
+
+def by_case(message: Message, value: Callable[[str, Value], Raw]) -> dict[str, Raw]:
+    """Raw values; those of a choice under the name of each case. `value` gives one by its name."""
+    found: dict[str, Raw] = {name: value(name, kind) for name, kind in message.beside}
+    for slot in message.slots:
+        numbers = {name: raw for name, raw in found.items() if isinstance(raw, int)}
+        sent = not slot.choice or holds(slot, numbers)
+        for name, kind in slot.values():
+            found[name] = value(slot.choice or name, kind) if sent else None
+    return found
 
 
 def native(kind: Value, raw: Any) -> Any:
@@ -200,7 +211,11 @@ class PythonTarget(Target):
             return [self._object(hint, each) for each in found]
         if not isinstance(found, dict):
             return found
-        kind = getattr(self.module, hint.removesuffix(" | None").removeprefix("list[").removesuffix("]"))
+        names = [each.removeprefix("list[").removesuffix("]") for each in hint.split(" | ")]
+        classes = [getattr(self.module, each) for each in names if hasattr(self.module, each)]
+        kinds = [each for each in classes if hasattr(each, "FIELDS")]
+        fitting = {naming.attribute(name) for name in found}
+        kind = next(each for each in kinds if set(each.FIELDS) == fitting)
         hints = kind.__init__.__annotations__
         inner = {naming.attribute(name): each for name, each in found.items()}
         return kind(**{key: self._object(hints[key], each) for key, each in inner.items()})
@@ -259,8 +274,8 @@ class InterpreterTarget(Target):
         """See Target."""
         place = address if self.reference.address_name else None
         try:
-            wire = self._codec.encode(message.name, given, place, request)
-            return pack(self._plan.message(message.name).payload, given), wire
+            wire = self._codec.encode(message.name, message.by_name(given), place, request)
+            return pack(self._plan.message(message.name).payload, message.by_name(given)), wire
         except Unsendable as error:
             raise Wrong("encode", str(error)) from None
 
@@ -278,7 +293,7 @@ class InterpreterTarget(Target):
         found = decoded.values
         found = {**decoded.beside, **found}
         shape = self.reference.by_name[decoded.message.name]
-        values = {name: told(kind, found[name]) for name, kind in shape.values()}
+        values = by_case(shape, lambda name, kind: told(kind, found[name]))
         return Seen(shape.name, decoded.address, values)
 
     def events(self, direction: Direction, stream: bytes, asked: Sequence[bytes] = ()) -> list[Heard]:
@@ -393,6 +408,12 @@ class CTarget(Target):
         words = iter(found)
         values: dict[str, Raw] = {name: told(kind, _raw(kind, words)) for name, kind in message.beside}
         for slot in message.slots:
+            if slot.choice:
+                sent = holds(slot, {name: raw for name, raw in values.items() if isinstance(raw, int)})
+                values |= {
+                    name: told(kind, _raw(kind, words)) if sent else None for name, kind in slot.values()
+                }
+                continue
             absent = slot.conditional and slot.values() and next(words) == "0"
             read = {name: told(kind, _raw(kind, words)) for name, kind in slot.values()}
             values |= dict.fromkeys(read) if absent else read
@@ -430,6 +451,10 @@ def _message_words(message: Message, given: Mapping[str, Any]) -> Iterator[str]:
         yield from _words(number, given[name])
     for slot in message.slots:
         values = slot.values()
+        if slot.choice:
+            for name, kind in values:
+                yield from _words(kind, given[name]) if given[name] is not None else ()
+            continue
         if slot.conditional and values:
             yield str(int(given[values[0][0]] is not None))
         for name, kind in values:

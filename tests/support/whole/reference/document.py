@@ -205,6 +205,8 @@ class Slot:
     optional: bool = False
     #: A new message has it.
     given: bool = True
+    #: The value of which it is a case; its own name is then unknown to users.
+    choice: str = ""
 
     @property
     def conditional(self) -> bool:
@@ -297,6 +299,15 @@ class Message:
         """Values in wire order, those of the frame first."""
         yield from self.beside
         yield from _values(self.slots)
+
+    def by_name(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Values as users see them: of a choice that of its case, under the name of the choice."""
+        found = {name: given[name] for name, _ in self.beside}
+        for slot in self.slots:
+            for name, _ in slot.values():
+                if not slot.choice or found.get(slot.choice) is None:
+                    found[slot.choice or name] = given[name]
+        return found
 
     @property
     def walked(self) -> bool:
@@ -420,6 +431,8 @@ def _counting(fields: Mapping[str, Any]) -> Doc:
     found = dict(fields)
     for name, spec in fields.items():
         written = spec if isinstance(spec, dict) else {"type": spec}
+        if "switch" in written:
+            continue
         base, _, size = str(written["type"]).partition("[")
         count = found.get(size.rstrip("]"))
         if count is not None:
@@ -455,9 +468,12 @@ class Fields:
     def _slots(self, fields: Mapping[str, Any]) -> tuple[Slot, ...]:
         slots: list[Slot] = []
         for name, spec in _counting(fields).items():
+            if isinstance(spec, dict) and "switch" in spec:
+                slots += self._cases(name, spec, slots)
+                continue
             resolved = self._resolved(spec)
             slots.append(self._conditional(self._slot(name, resolved), resolved, slots))
-        return tuple(self._counting_several(slot, fields[slot.name], slots) for slot in slots)
+        return tuple(self._counting_several(slot, fields.get(slot.name), slots) for slot in slots)
 
     @staticmethod
     def _counting_several(slot: Slot, spec: Any, slots: Sequence[Slot]) -> Slot:
@@ -469,6 +485,28 @@ class Fields:
         more = sum(each.most_bytes for each in slots if each.name in counted and each.name != run)
         unit = slot.counts_in if len(counted) == 1 else "bytes"
         return replace(slot, counts=run, counts_in=unit, more=more)
+
+    def _cases(self, name: str, spec: Doc, before: list[Slot]) -> list[Slot]:
+        """The cases of a choice as fields that exclude each other."""
+        tag = spec["switch"].split(".")[-1]
+        number = dict(_values(before))[tag]
+        assert isinstance(number, Number)
+        keys = [self._wanted(key) for key in spec["cases"]]
+        tests: list[Test] = [(tag, (key,), False) for key in keys]
+        kinds = list(spec["cases"].values())
+        if "default" in spec:
+            tests.append((tag, tuple(keys), True))
+            kinds.append(spec["default"])
+        found = []
+        for index, (test, kind) in enumerate(zip(tests, kinds, strict=True)):
+            if isinstance(kind, dict) and "type" not in kind:
+                slot = Slot(f"{name}@{index}", Record(self._slots(kind)))
+            else:
+                slot = self._slot(f"{name}@{index}", self._resolved(kind))
+            if kind:
+                given = _met(test, number.default)
+                found.append(replace(slot, when=(test,), given=given, choice=name))
+        return found
 
     def _conditional(self, slot: Slot, spec: Doc, before: list[Slot]) -> Slot:
         """The slot with what decides whether it is present."""
@@ -860,7 +898,7 @@ def _numbers(slot: Slot) -> Iterator[tuple[str, Number]]:
 
 def _from_request(spec: Any, asked: Mapping[str, Number]) -> Any:
     """A field with the range of the field of the request that has its number of items."""
-    text = spec["type"] if isinstance(spec, dict) else spec
+    text = spec.get("type", "") if isinstance(spec, dict) else spec
     if not (match := re.search(r"\[request\.(\w+)\]", text)):
         return spec
     number = asked[match[1]]
