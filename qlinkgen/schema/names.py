@@ -256,10 +256,22 @@ def _macro_owners(
             yield f"{name}_{direction}", f"{name}.{direction}", _MESSAGE_MACROS, ("commands", name)
     for name, path in reply_messages(file):
         yield _class_base(file, snake(name)), f"the reply '{name}'", _MESSAGE_MACROS, path
-    for name, path in step_messages(file):
-        yield _class_base(file, snake(name)), f"the step '{name}'", _MESSAGE_MACROS, path
+    yield from _step_owners(file)
     for name in file.messages:
         yield _class_base(file, name), f"the message '{name}'", _MESSAGE_MACROS, ("messages", name)
+
+
+def _step_owners(file: SchemaFile) -> Iterator[tuple[str, str, Sequence[str], Path]]:
+    """The same for dialogues."""
+    for name, path in step_messages(file):
+        yield _class_base(file, snake(name)), f"the step '{name}'", (*_MESSAGE_MACROS, "turn"), path
+    for name, spec in file.commands.items():
+        place: Path = ("commands", name, "steps")
+        if spec.steps is not None:
+            yield name, f"the dialogue '{name}'", ("steps",), place
+        for index, step in enumerate(spec.steps or ()):
+            if isinstance(step.send, str):
+                yield _class_base(file, step.send), f"the message '{step.send}'", ("turn",), (*place, index)
 
 
 def _conversions(
