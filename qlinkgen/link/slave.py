@@ -9,6 +9,7 @@ from qlinkgen.link.codec import Codec, Framed, Message, address_of, is_message, 
 from qlinkgen.link.echo import EchoCanceller
 from qlinkgen.link.numbering import numbering_of
 from qlinkgen.link.slave_dialogue import Answers, Handling, Refusal, SlaveDialogue
+from qlinkgen.link.unknown import unknown_requests
 
 __all__ = ["Node", "Refusal", "SlaveCounters", "SlaveEngine"]
 
@@ -39,11 +40,12 @@ class SlaveCounters:
         replaced: responses discarded because another frame arrived before they were sent.
         untimely: frames of a dialogue that were not due, or came too late.
         foreign: frames to and from other nodes.
+        unknown: requests to this node with an unknown number, which it refused.
         damaged: damaged frames, by kind. The answers of other nodes are decoded as requests and often count
             here.
     """
 
-    __slots__ = ("answers", "broadcasts", "damaged", "foreign", "replaced", "requests", "untimely")
+    __slots__ = ("answers", "broadcasts", "damaged", "foreign", "replaced", "requests", "unknown", "untimely")
 
     def __init__(self) -> None:
         self.requests = 0
@@ -52,6 +54,7 @@ class SlaveCounters:
         self.replaced = 0
         self.untimely = 0
         self.foreign = 0
+        self.unknown = 0
         self.damaged: dict[str, int] = {}
 
     def __repr__(self) -> str:
@@ -103,6 +106,7 @@ class SlaveEngine:
         self._encode = codec.encode
         self._numbering = numbering_of(codec)
         self._broadcast = codec.BUS.broadcast
+        self._addressed = codec.BUS.first_node is not None
         self._answering = {
             command.request: command.addressing == "answered_broadcast" for command in codec.COMMANDS.values()
         }
@@ -117,6 +121,7 @@ class SlaveEngine:
         self._turnaround = turnaround
         speed = baud or codec.BUS.baud
         self._byte_time = codec.BUS.bits_per_byte / speed if speed else 0.0
+        self._unknown = unknown_requests(codec, self._byte_time)
         self._echo = EchoCanceller(echo)
         self._last = b""
         self._answer = b""
@@ -129,16 +134,35 @@ class SlaveEngine:
         if self._echo.active:
             data = self._echo.cancel(data)
         self._last = data[-1:]
+        if self._unknown is not None and data:
+            self._unknown.received(data, now)
         for event in self._decoder.feed(data):
             if is_message(event):
                 self._heard(event, now)
             else:
                 damaged = self.counters.damaged
                 damaged[event.kind] = damaged.get(event.kind, 0) + 1
+                if self._unknown is not None and event.kind == "unknown":
+                    self._refuse(self._unknown.answer(event.raw, self._node), now)
+
+    @property
+    def _node(self) -> int | None:
+        return self.node.number if self._addressed else None
+
+    def _refuse(self, answer: Framed | None, now: float) -> None:
+        """Answer a request with an unknown number; None if there is none."""
+        if answer is not None:
+            self.counters.unknown += 1
+            self._request = None
+            self._further = []
+            self._answer = self._encode(answer)
+            self._due = now + self._turnaround
 
     def _heard(self, request: Framed, now: float) -> None:
         if self._echo.active and self._echo.is_own(self._encode(request)):
             return
+        if self._unknown is not None:
+            self._unknown.known()
         if self._answer:  # the master no longer waits for it, as it sends again
             self.counters.replaced += 1
             self._answer = b""
@@ -250,6 +274,8 @@ class SlaveEngine:
 
     def bytes_to_send(self, now: float) -> bytes:
         """Return the answer if it is due."""
+        if self._unknown is not None and self._unknown.due is not None and now >= self._unknown.due:
+            self._refuse(self._unknown.silent(self._node), now)
         answer = self._answer
         if not answer or now < self._due:
             return b""
@@ -261,5 +287,8 @@ class SlaveEngine:
         return answer
 
     def next_timer(self) -> float | None:
-        """Return when an answer is due, None without an answer."""
-        return self._due if self._answer else None
+        """Return when an answer is due, or the line has been idle where that matters; None otherwise."""
+        silence = None if self._unknown is None else self._unknown.due
+        if not self._answer:
+            return silence
+        return self._due if silence is None else min(self._due, silence)

@@ -11,7 +11,7 @@ from qlinkgen.model.fields import Value
 from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame, PartBits
 from qlinkgen.model.message import Direction, Example, Message
 from qlinkgen.model.texts import Text, without_texts
-from qlinkgen.model.transaction import Bus, Command, Exchange, Reply, exchanges_of
+from qlinkgen.model.transaction import Bus, Command, Exchange, Reply, Unknown, exchanges_of
 from qlinkgen.model.types import ByteOrder, Enum, Flags
 
 
@@ -43,6 +43,8 @@ class Protocol:
     #: False after `without_texts`.
     texts: bool = True
     examples: tuple[Example, ...] = ()
+    #: What a slave replies to a request with an unknown number, None if it is silent.
+    to_unknown: Unknown | None = None
     #: The schema that it includes, relative to its own, "" for none.
     includes: str = ""
 

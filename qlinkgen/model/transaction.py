@@ -83,6 +83,21 @@ class Reply:
 
 
 @dataclass(frozen=True, slots=True)
+class Unknown:
+    """The reply of a slave to a request with a number that it does not know.
+
+    Attributes:
+        message: the reply, to any of the commands.
+        added: what its number adds to that of the request, None if it has one of its own.
+        raws: fields and their raw numbers; others have their defaults.
+    """
+
+    message: Message
+    added: int | None
+    raws: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class ByCount:
     """A fixed number of answers, or as many as a field of the request says, at most ``most``."""
 

@@ -75,6 +75,10 @@ class SchemaFile(FileMapping):
     replies: Replies = Field(
         default_factory=dict, description="Answers other than the response, of all answered commands"
     )
+    to_unknown: dict[str, dict[str, Label]] = Field(
+        default_factory=dict,
+        description="Reply of a slave to a request with an unknown id, by its name; values of its fields",
+    )
     commands: dict[str, CommandSpec] = Field(default_factory=dict, description="Transactions by name")
     messages: dict[str, MessageSpec] = Field(
         default_factory=dict, description="Messages without a response, by name"

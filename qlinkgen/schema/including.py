@@ -14,7 +14,7 @@ from qlinkgen.schema.source import Data, Path, Position, Source, parse
 _RULE = "bad-include"
 _KEY: Path = ("include",)
 #: Mappings that are taken over, by name; the rest belongs to one protocol.
-GROUPS = ("enums", "flags", "types", "attributes", "replies", "commands", "messages")
+GROUPS = ("enums", "flags", "types", "attributes", "replies", "to_unknown", "commands", "messages")
 #: Frames of the other document.
 _LEFT = "examples"
 

@@ -31,6 +31,7 @@ from qlinkgen.schema.switches import without_choices
 from qlinkgen.schema.terminators import check_terminator
 from qlinkgen.schema.types import TypeBuilder
 from qlinkgen.schema.unconfirmed import report_unconfirmed
+from qlinkgen.schema.unknown import UnknownBuilder
 from qlinkgen.schema.versions import FIRST, boundaries, check_lifetimes, in_version
 
 
@@ -184,6 +185,7 @@ def _build(
         includes=file.include or "",
         version=str(version) if version else "",
     )
+    protocol = replace(protocol, to_unknown=UnknownBuilder(file, report, frame, commands.commands).build())
     check_told(protocol, messages.id_places, report)
     # With another checksum, or in another version, the bytes of the document are wrong.
     examples = build_examples(file, protocol, report) if crc is None and version is None else ()

@@ -130,6 +130,44 @@ def test_a_function_answers_with_a_reply(
     assert told.splitlines() == [answer.hex() for _, answer in cases]
 
 
+@pytest.mark.parametrize(("compiler", "package"), [("gcc", "gcc"), ("clang", "clang")])
+@pytest.mark.parametrize("reply", ["fault", "nak"])
+def test_a_slave_refuses_what_it_does_not_know(
+    tmp_path: Path, compiler: str, package: str, reply: str, require_tool: Callable[..., str]
+) -> None:
+    require_tool(compiler, package=package)
+    stated = f"to_unknown: {{{reply}: {'{reason: 9}' if reply == 'fault' else '{}'}}}\ncommands:"
+    schema = SCHEMA.replace("commands:", stated).replace("  parts:\n", "  parts:\n    start: A5\n")
+    protocol, faults = loads(schema, "pump.yaml")
+    assert protocol is not None, faults
+    pump = load_codec(protocol)
+
+    def refusal(number: int) -> bytes:
+        if reply == "nak":
+            return bytes(pump.Nak(node=3).to_frame())
+        return bytes(type("Other", (pump.ReadFault,), {"ID": number + 0x80})(node=3, reason=9).to_frame())
+
+    def unknown(number: int, node: int) -> bytes:
+        frame = bytes([0xA5, node, number, 1, 7])
+        crc = pump._CHECKSUM
+        return frame + int(crc.compute(frame[1:3] + frame[4:], crc.start)).to_bytes(2, "big")
+
+    cases = [
+        (pump.ReadRequest(node=3, number=4).to_frame(), pump.ReadResponse(node=3, value=4).to_frame()),
+        (unknown(0x22, 3), refusal(0x22)),
+        (unknown(0x22, 4), b""),
+        (unknown(0x22, 0), b""),
+        (unknown(0x90, 3), b"" if reply == "fault" else refusal(0)),  # no number is left for its refusal
+        (pump.LogRequest(node=3, many=2).to_frame(), refusal(0x13)),
+        (pump.SetRequest(node=3, value=0).to_frame(), pump.SetResponse(node=3).to_frame()),
+    ]
+    source = PROGRAM.replace("PUMP_REQUEST, ", "").replace("slave.log = on_log", "(void)on_log")
+    program = built(tmp_path, compiler, "-O1", "-std=c99", schema=schema, text_of_main=source)
+    arguments = [request.hex() for request, _ in cases]
+    told = subprocess.run([program, *arguments], check=True, capture_output=True, text=True).stdout
+    assert told.splitlines() == [answer.hex() for _, answer in cases]
+
+
 def test_headers_without_replies_have_nothing_of_them() -> None:
     text = SCHEMA.replace("  fault: {id: request.id + 0x80, fields: {reason: u8}}\n", "")
     text = text.replace("replies:\n  nak: {id: 0x7F, fields: {}}\n", "")

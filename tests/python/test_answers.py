@@ -138,6 +138,13 @@ def slave_of(codec: Any, calls: Any) -> Any:
     return Slave(3)
 
 
+def test_a_slave_refuses_what_it_does_not_support(modules: tuple[Any, Any]) -> None:
+    codec, calls = modules
+    slave, busy = calls.SlaveHandlers(3), codec.Busy(node=3)
+    assert slave.handle(codec.ReadRequest(node=3, number=1), 0.0) == busy
+    assert slave.handle(codec.LogRequest(node=3, number=1), 0.0) == [busy]
+
+
 def test_calls_and_handlers(modules: tuple[Any, Any]) -> None:
     codec, calls = modules
     wire = Wire(baud=19200)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from qlinkgen.backends.c.framing import Address, Expected, expected
-from qlinkgen.backends.c.names import Names, count_type
+from qlinkgen.backends.c.framing import Address, Expected, Function, expected
+from qlinkgen.backends.c.names import Names, count_type, unsigned
+from qlinkgen.model.fields import FieldType
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import handler, member, snake
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.transaction import Allowance, Bus, Command, Exchange, Repeat
+from qlinkgen.model.transaction import Allowance, Bus, Command, Exchange, Repeat, Unknown
+from qlinkgen.model.types import Scalar
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -264,17 +266,71 @@ def dialogues(names: Names, commands: Iterable[Command]) -> list[DialogueEntry]:
     ]
 
 
-def slave_groups(entries: list[SlaveEntry], prefix: str) -> list[SlaveGroup]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refusal:
+    """The reply to an unknown request.
+
+    Attributes:
+        values: members and their numbers.
+        parameters: those of a function that encodes it with any number, whose statements are ``lines``.
+        id: its number, "" if it is constant.
+        fits: condition for a number that fits the frame, "" if every one does.
+    """
+
+    function: str
+    constant: str
+    has_struct: bool
+    values: list[tuple[str, str]]
+    parameters: str
+    lines: list[str]
+    id: str
+    fits: str
+
+
+def refusal(names: Names, unknown: Unknown, plan: MessagePlan, whole: Function, number: str) -> Refusal:
+    """The reply to an unknown request; ``whole`` is the function that encodes it, ``number`` a member."""
+    message, fixed = plan.message, unknown.added is None
+    constant, added = names.constant(message), unknown.added or 0
+    bits = sum(each.bits for each in plan.envelope.id)
+    kinds = {value.name: value.type for value in message.values}
+    most = unsigned(max(0, (1 << bits) - 1 - added), bits)
+    fits = f"frame->{number} <= {most}" if added >= 0 else f"frame->{number} >= {unsigned(-added, bits)}"
+    return Refusal(
+        function=names.function(message),
+        constant=constant,
+        has_struct=bool(message.values),
+        values=[(member(name), _literal(kinds[name], raw)) for name, raw in unknown.raws],
+        parameters=whole.parameters,
+        lines=[line.replace(f"{constant}_ID", "id") for line in whole.lines],
+        id="" if fixed else f"frame->{number} {'-' if added < 0 else '+'} {unsigned(abs(added), bits)}",
+        fits="" if fixed else fits,
+    )
+
+
+def _literal(kind: FieldType, raw: int) -> str:
+    assert isinstance(kind, Scalar)
+    return unsigned(raw, kind.bits) if raw >= 0 else str(raw)
+
+
+def refusing(entry: SlaveEntry, prefix: str) -> SlaveEntry:
+    """A request that is refused if the slave has no function for it."""
+    if not entry.answered:
+        return entry
+    return replace(entry, unsupported=f"{prefix}_refuse_(slave, frame, wire, capacity)")
+
+
+def slave_groups(entries: list[SlaveEntry], prefix: str, *, refuses: bool) -> list[SlaveGroup]:
     """The groups of requests; the last one calls the others."""
     own = [entry for entry in entries if entry.own]
-    writes = any(entry.answered for entry in own or entries)
+    writes = refuses or any(entry.answered for entry in own or entries)
+    none = f"{prefix}_refuse_(slave, frame, wire, capacity)" if refuses else "0"
     if not own:
-        return [SlaveGroup("any", "All requests.", entries, "0", writes)]
+        return [SlaveGroup("any", "All requests.", entries, none, writes)]
     others = [entry for entry in entries if not entry.own]
     call = f"{prefix}_handle_own_(slave, frame, wire, capacity)"
     rest = "Requests that may be broadcast; the others must not be."
     return [
-        SlaveGroup("own", "Requests to one node.", own, "0", writes),
+        SlaveGroup("own", "Requests to one node.", own, none, writes),
         SlaveGroup("any", rest, others, f"slave->broadcast ? 0 : {call}", writes=True),
     ]
 

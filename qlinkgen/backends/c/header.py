@@ -257,7 +257,8 @@ class Header:
             example_command=snake(answered.name).upper() if answered else "",
             slave=slave,
             replies=self._replies(slave),
-            slave_groups=dispatch.slave_groups(slave, self._names.prefix),
+            refusal=self._refusal() if slave else None,
+            slave_groups=dispatch.slave_groups(slave, self._names.prefix, refuses=self._refuses),
             master=dispatch.callbacks(self._names, self._addresses["response"], self._plan.messages)
             if listens
             else [],
@@ -271,13 +272,29 @@ class Header:
     def _slave(self) -> list[dispatch.SlaveEntry]:
         section = self._section
         addressed = bool(section.view.address)
-        return dispatch.slave_entries(
+        found = dispatch.slave_entries(
             self._names,
             self._kept,
             self._protocol.exchanges,
             addressed=addressed,
             reject=section.reject,
         )
+        return [dispatch.refusing(each, self._names.prefix) for each in found] if self._refuses else found
+
+    @property
+    def _refuses(self) -> bool:
+        """Whether a slave refuses unknown requests."""
+        unknown = self._protocol.to_unknown
+        return unknown is not None and unknown.message.name in self._plan.by_name
+
+    def _refusal(self) -> dispatch.Refusal | None:
+        """The refusal of unknown requests, None if a slave is silent."""
+        unknown = self._protocol.to_unknown
+        if unknown is None or not self._refuses:
+            return None
+        message, view = self._plan.by_name[unknown.message.name], self._section.view
+        whole = self._section.to_frame(self._names, self._addresses["response"], message)
+        return dispatch.refusal(self._names, unknown, message, whole, view.id)
 
     def _replies(self, slave: Sequence[dispatch.SlaveEntry]) -> list[dispatch.ReplyEntry]:
         """Functions that answer in another way, if any function of the slave may."""

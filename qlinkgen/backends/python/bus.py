@@ -22,7 +22,7 @@ from qlinkgen.model.fields import Value
 from qlinkgen.model.naming import file_stem, method
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line
-from qlinkgen.model.transaction import Command
+from qlinkgen.model.transaction import Command, Reply, Unknown
 from qlinkgen.model.types import Enum
 from qlinkgen.plan import MessagePlan, Plan, plan_of
 from qlinkgen.plan.payload import BytesStep, Holder, RecordsStep, RecordStep, by_slot
@@ -401,7 +401,25 @@ class BusModule:
         if call.others:
             names = " or ".join(self._class(each) for each in call.others)
             doc += ["", *textwrap.wrap(f"Return {names} to answer in another way.", WIDTH - 8)]
-        return Method(head, python_text.docstring(doc), [])
+        return Method(head, python_text.docstring(doc), self._refusing(call))
+
+    def _refusing(self, call: Transaction) -> list[str]:
+        """What a slave without a method for a command does: it refuses, if the schema says so."""
+        unknown = self._plan.protocol.to_unknown
+        reply = next((r for r in call.command.replies if unknown and _is_reply(r, unknown)), None)
+        message = next((each for each in call.others if reply and each.name == reply.message.name), None)
+        if unknown is None or message is None:
+            return []
+        node = [f"{self._place.address}=self.number"] if self._place.address else []
+        given = [*node, *(f"{attribute(name)}={raw}" for name, raw in unknown.raws)]
+        several = call.command.many is not None
+        before, after = ("return [", ")]") if several else ("return ", ")")
+        return wrapped(f"{before}{self._class(message)}(", given, after, 8)
+
+
+def _is_reply(reply: Reply, unknown: Unknown) -> bool:
+    """Whether a reply is the one to unknown requests, for its own command."""
+    return reply.message.name.rpartition(".")[2] == unknown.message.name.rpartition(".")[2]
 
 
 def _summary(command: Command) -> list[str]:

@@ -175,7 +175,10 @@ class ClassBuilder:
         if shape := self._shapes.get(self._shape_of(message)):
             return replace(head, base=shape[0])
         head = replace(head, facts=[*facts, *self._checked(message)])
-        return self._with_codec(message, head, constant_name(message.name), in_hex(message.id))
+        unknown = self._plan.protocol.to_unknown
+        refusing = unknown is not None and unknown.message.name == message.name  # with any number
+        number = "self.ID" if refusing else in_hex(message.id)
+        return self._with_codec(message, head, constant_name(message.name), number)
 
     def _with_codec(self, message: MessagePlan, head: ClassModel, title: str, number: str) -> ClassModel:
         """A class with its code; ``title`` is a part of the names of its constants, ``number`` is its id."""

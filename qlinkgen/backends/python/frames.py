@@ -17,7 +17,7 @@ from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import address_argument, address_attribute
 from qlinkgen.plan.check import Check
-from qlinkgen.plan.ends import ByLength, ByMark, ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import ByLength, ByMark, ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import (
     AddressPart,
@@ -374,6 +374,54 @@ def view_of(plan: Plan, title: str, sizes: Sequence[int]) -> FrameView:
             return _packet(plan, title)
         case _:
             assert_never(receiver)
+
+
+# Unknown requests
+
+
+@dataclass(frozen=True)
+class UnknownView:
+    """The reply to a request with an unknown number: its class, and the arguments of that.
+
+    Attributes:
+        number: the number in ``frame``.
+        address: the address in it, "" if there is none.
+        added: what the number of the reply adds to that of the request, None if it has one of its own.
+        most: the greatest number.
+        by_message: the message tells the end of a frame, so a silence tells that of an unknown one.
+    """
+
+    reply: str
+    arguments: str
+    number: str
+    address: str
+    added: int | None
+    most: str
+    by_message: bool
+
+
+def unknown_view(plan: Plan) -> UnknownView | None:
+    """The reply to a request with an unknown number, None if the decoder is not one of requests."""
+    unknown = plan.protocol.to_unknown
+    if (
+        unknown is None
+        or "request" not in plan.received_directions
+        or unknown.message.name not in plan.by_name
+    ):
+        return None
+    frame = plan.frames["request"]
+    envelope, address = frame.envelope, plan.frame.address
+    arguments = [f"{address_attribute(address)}=node or 0"] if address else []
+    arguments += [f"{attribute(name)}={raw}" for name, raw in unknown.raws]
+    return UnknownView(
+        reply=class_name(plan.by_name[unknown.message.name]),
+        arguments=", ".join(arguments),
+        number=pieces.number(envelope, envelope.id, "frame"),
+        address=pieces.number(envelope, envelope.address, "frame") if envelope.address else "",
+        added=unknown.added,
+        most=in_hex((1 << sum(each.bits for each in envelope.id)) - 1),
+        by_message=isinstance(frame.end, ByMessage),
+    )
 
 
 # Directions

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from qlinkgen.backends import python_text
 from qlinkgen.backends.base import banner
@@ -78,6 +78,7 @@ class ModuleView:
     direction_default: str
     asked: Sequence[str]
     carrier: str
+    unknown: frames.UnknownView | None
     stream_decoder: Sequence[str]
     doc: Sequence[str]
     enums: Sequence[tables.ConstantsModel]
@@ -118,6 +119,7 @@ class Module:
             direction_type=f"Literal[{', '.join(quoted)}]",
             direction_default=f" = {quoted[0]}" if len(quoted) == 1 else "",
             asked=_asked(plan),
+            unknown=frames.unknown_view(plan),
             carrier=class_name(plan.carrier) if plan.carrier else "",
             stream_decoder=_stream_decoder(quoted),
             doc=self._doc(),
@@ -134,7 +136,11 @@ class Module:
             directed=plan.directed,
             frames_with={way: sections.ways.of("_frame_with", way) for way in views},
         )
-        decoder = _placed(f"{view.template}_decoder.j2", module, search=sections.search).strip()
+        asked = replace(module, f=views.get("request", view))
+        refusing = sections.ways.of(_placed("unknown.j2", asked), "request")
+        decoder = _placed(
+            f"{view.template}_decoder.j2", module, search=sections.search, refusing=refusing
+        ).strip()
         return _tidy(_placed("module.j2", module, frame=sections.frame, decoder=decoder))
 
     def _doc(self) -> list[str]:
@@ -232,6 +238,7 @@ class Module:
         names += ["OtherReply"] if any(each.meant for each in self.plan.commands) else []
         names += ["BUS", "COMMANDS", "MESSAGES", "Message", "StreamDecoder", *_PUBLIC]
         names += [each.function for each in decoded_directions]
+        names += ["answer_unknown"] if frames.unknown_view(self.plan) else []
         names += ["answer_to"] if _asked(self.plan) else []
         match view:
             case PacketView():
