@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from typing import BinaryIO
 
-from construct import Construct, ConstructError, Container, RangeError, stream_read_entire
+from construct import (
+    Construct,
+    ConstructError,
+    Container,
+    RangeError,
+    stream_read_entire,
+)
 
 from ._fields import Message, Values
 from ._frames import Frame, FrameError
@@ -21,8 +27,8 @@ class Asked:
 class Told(Construct):
     """The frames of a slave, some of which have the number of several answers.
 
-    Parsed with ``request``, the frame that it answers, it is the first answer to that whose payload is valid;
-    without, the message that carries all of them.
+    Parsed with ``request``, the frame that it answers, it is the first answer to that
+    whose payload is valid; without, the message that carries all of them.
     """
 
     def __init__(
@@ -35,7 +41,9 @@ class Told(Construct):
         self.frame = frame
         self.requests = requests
         self.asked = {each.request: each.answers for each in asked}
-        others = {each.name: each for answers in self.asked.values() for each in answers}
+        others = {
+            each.name: each for answers in self.asked.values() for each in answers
+        }
         number = next(iter(others.values())).id
         self.carrier = frame.by_id[number].name
         self.by_name = frame.by_name | others
@@ -52,7 +60,9 @@ class Told(Construct):
         beside: Values | None = None,
     ) -> bytes:
         """A frame around a payload, see Frame."""
-        return self.frame.wrap(message, payload, address, request, number, beside=beside)
+        return self.frame.wrap(
+            message, payload, address, request, number, beside=beside
+        )
 
     def _build(
         self, obj: Values, stream: BinaryIO, context: Container, path: str

@@ -256,8 +256,10 @@ def _asked(plan: Plan) -> list[str]:
     """The rows of the table of answers that only their request tells apart; none without a decoder."""
     if "response" not in plan.received_directions:
         return []
-    named = {request: ", ".join(map(class_name, answers)) for request, answers in plan.asked.items()}
-    return [f"{class_name(plan.message(request))}: ({answers},)" for request, answers in named.items()]
+    return [
+        f"{class_name(plan.message(request))}: {tables.tuple_of([class_name(each) for each in answers])}"
+        for request, answers in plan.asked.items()
+    ]
 
 
 def _stream_decoder(directions: Sequence[str]) -> list[str]:

@@ -129,13 +129,13 @@ def _answers(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
         for name, asked in command.sizes
     ]
     if sizes:
-        arguments.append(f"sizes={_tuple(sizes)}")
+        arguments.append(f"sizes={tuple_of(sizes)}")
     steps = [_step(each, kept[each.message.name]) for each in command.steps]
     if steps:
-        arguments.append(f"steps={_tuple(steps)}")
+        arguments.append(f"steps={tuple_of(steps)}")
     replies = [_reply(each, kept[each.message.name]) for each in command.meant if each.message.name in kept]
     if replies:
-        arguments.append(f"replies={_tuple(replies)}")
+        arguments.append(f"replies={tuple_of(replies)}")
     return arguments
 
 
@@ -173,13 +173,13 @@ def _reply(reply: Reply, planned: MessagePlan) -> str:
     arguments = [class_name(planned), f'"{reply.means}"']
     if reply.switch:
         cases = [f'({case.first}, {case.last}, "{case.means}")' for case in reply.cases]
-        arguments += [f'switch="{attribute(reply.switch)}"', f"cases={_tuple(cases)}"]
+        arguments += [f'switch="{attribute(reply.switch)}"', f"cases={tuple_of(cases)}"]
     if reply.within is not None:
         arguments.append(f"within={_time(reply.within)}")
     if reply.after != Allowance():
         arguments.append(f"after={_time(reply.after)}")
     if reply.echoes:
-        arguments.append(f"echoes={_tuple([_quoted(attribute(name)) for name in reply.echoes])}")
+        arguments.append(f"echoes={tuple_of([_quoted(attribute(name)) for name in reply.echoes])}")
     return f"OtherReply({', '.join(arguments)})"
 
 
@@ -191,7 +191,8 @@ def _quoted(name: str) -> str:
     return f'"{name}"'
 
 
-def _tuple(items: Sequence[str]) -> str:
+def tuple_of(items: Sequence[str]) -> str:
+    """A tuple of expressions."""
     return f"({', '.join(items)}{',' if len(items) == 1 else ''})"
 
 
@@ -201,7 +202,7 @@ def _repetition(command: Command) -> list[str]:
     facts = {
         "repeat_safe=True": command.repeat.safe,
         f'repeat_counter="{attribute(command.repeat.counter)}"': command.repeat.counter,
-        f"echoes={_tuple(names)}" if names else "": names,
+        f"echoes={tuple_of(names)}" if names else "": names,
     }
     return [argument for argument, given in facts.items() if given]
 
