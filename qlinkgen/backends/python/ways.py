@@ -65,7 +65,11 @@ def merged(texts: Mapping[str, Mapping[str, str]], ways: Ways) -> str:
             if name in found:
                 text = ways.of(found[name], way)
                 printed.setdefault(ways.of(name, way), text)
-    return "".join(f"\n\n\n{text}" if text.startswith("def ") else f"\n{text}" for text in printed.values())
+    found, last = "", ""
+    for text in printed.values():
+        apart = any(each.startswith("def ") for each in (last, text))
+        found, last = f"{found}\n\n\n{text}" if apart else f"{found}\n{text}", text
+    return found
 
 
 def _order(first: list[str], other: list[str]) -> list[str]:
