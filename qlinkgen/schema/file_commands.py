@@ -24,6 +24,7 @@ from qlinkgen.schema.file_base import BRANCH, Fact, FileMapping, Lifetime
 from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.kinds import (
     AnswerNumber,
+    AnyCondition,
     ByteText,
     Count,
     Id,
@@ -220,6 +221,9 @@ class ReplySpec(Fact):
     id: AnswerNumber | None = Field(default=None, description="Its number: 0x15 or request.id + 0x80")
     separator: Separator | None = Field(
         default=None, description="Character between the fields, which are texts; none: there is none"
+    )
+    when: AnyCondition | None = Field(
+        default=None, alias="if", description="Value of the direction of its frames: {way: refused}"
     )
     fields: Fields = Field(description="Its fields, in wire order")
     means: Annotated[MeansSpec, ShortForm("default", "string")] = Field(

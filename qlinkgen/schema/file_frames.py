@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Annotated, Final, Literal
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     Discriminator,
@@ -29,6 +30,7 @@ from qlinkgen.schema.kinds import (
     Characters,
     Consts,
     Id,
+    Name,
     Order,
     Rational,
     ScalarValue,
@@ -65,7 +67,17 @@ _TELLING: Final[Mapping[str, PartKind]] = {
 #: Bytes as a short form; names are in lower case.
 _HEX_PAIRS = re.compile(r"\s*(?:[0-9A-F]{2}\s*)+\Z", re.ASCII)
 
-Directions = Annotated[dict[Literal["request", "response"], Id], Field(min_length=2)]
+
+def _both(values: dict[str, int]) -> dict[str, int]:
+    """Both directions, and perhaps more. Raises ValueError."""
+    if missing := next((each for each in ("request", "response") if each not in values), ""):
+        raise ValueError(f"the value of a {missing} is missing; write {{request: 0, response: 1}}")
+    return values
+
+
+Directions = Annotated[
+    dict[Name, Id], AfterValidator(_both), Field(json_schema_extra={"required": ["request", "response"]})
+]
 
 
 class CrcSpec(FileMapping):
@@ -103,7 +115,9 @@ class PartBitSpec(BitSpec):
     per: Literal["request", "frame"] = Field(default="request", description="What a counter counts")
     echo: StrictBool = Field(default=False, description="Answers repeat the counter of their request")
     const: Consts | None = Field(default=None, description="Legal values, the first of which is sent")
-    values: Directions | None = Field(default=None, description="The value for each direction")
+    values: Directions | None = Field(
+        default=None, description="The value for each direction; others are of replies with `if`"
+    )
 
 
 class TrimSpec(FileMapping):
@@ -141,7 +155,9 @@ class PartSpec(Fact):
     const: Consts | None = Field(
         default=None, description="Legal values of a constant integer, the first of which is sent"
     )
-    values: Directions | None = Field(default=None, description="The value for each direction")
+    values: Directions | None = Field(
+        default=None, description="The value for each direction; others are of replies with `if`"
+    )
     per: Literal["request", "frame"] = Field(default="request", description="What a counter counts")
     echo: StrictBool = Field(default=False, description="Answers repeat the counter of their request")
     equals: str | None = Field(

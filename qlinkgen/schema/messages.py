@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from typing import Literal, NamedTuple, assert_never
 
 from qlinkgen.model.fields import Field, Record, Records
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
+from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame, PartBits
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.transaction import Addressing, Bus
 from qlinkgen.model.types import Array, Bits, Blob, Chunk, Scalar
@@ -37,6 +37,7 @@ class Written(NamedTuple):
         path: their place.
         asked: those with a number of items from the request.
         separator: the byte between them, None if it is that of the defaults.
+        way: the value of the direction, if it is not that of a request or a response.
     """
 
     part: str
@@ -46,6 +47,7 @@ class Written(NamedTuple):
     path: Path
     asked: Collection[str] = ()
     separator: bytes | None = None
+    way: str = ""
 
 
 class MessageBuilder:
@@ -163,10 +165,16 @@ class MessageBuilder:
             self._report.error("bad-separator", (*layout.path, name), what, "write its range", of_key=True)
         return separated(fields, separator, self._frame, layout.path, self._report)
 
+    @property
+    def ways(self) -> PartBits | None:
+        """The part, or the bits, with the direction."""
+        return self._ids.direction
+
     def _number(self, layout: Written, direction: Direction, name: str) -> int:
         path, command = layout.number_path, name.partition(".")[0]
         usual = path in (("commands", command, "id"), ("messages", name, "id"))
-        return self._ids.number(layout.number, direction, path, "" if usual else name)
+        whose = "" if usual else name
+        return self._ids.number(layout.number, direction, path, whose, way=layout.way)
 
     def _add(self, message: Message, layout: Written) -> None:
         self.places[message.name] = layout.path

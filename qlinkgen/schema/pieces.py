@@ -148,7 +148,7 @@ class PieceBuilder:
         for direction, number in values.items():
             self._check_fits(number, bits, (*path, "values", direction))
         if len(set(values.values())) < len(values):
-            what = f"{path[-1]} is the same in both directions"
+            what = f"{path[-1]} has one value twice"
             self._fault("bad-frame", (*path, "values"), what, "use different values")
         return {str(direction): number for direction, number in values.items()}
 
@@ -198,22 +198,27 @@ class IdBuilder:
         self._report = report
         self._frame = frame
         pieces = frame.id_bits if isinstance(frame, DelimitedFrame) else ()
-        self._direction = next((each for each in pieces if each.role == "direction"), None)
+        self.direction = next((each for each in pieces if each.role == "direction"), None)
         self._pieces = [each for each in pieces if each.role == "message"]
         by_parts = isinstance(frame, DelimitedFrame) and frame.directed
-        self._directed = by_parts or self._direction is not None
+        self._directed = by_parts or self.direction is not None
 
-    def number(self, stated: StatedId, direction: Direction, path: Path, whose: str = "") -> int:
-        """The id of a message, stated at a path; ``whose`` is its name if it is not that of its command."""
+    def number(
+        self, stated: StatedId, direction: Direction, path: Path, whose: str = "", *, way: str = ""
+    ) -> int:
+        """The id of a message, stated at a path; ``whose`` is its name if it is not that of its command.
+
+        ``way`` is the value that states the direction, if it is another one than that of the direction.
+        """
         number = self._stated(stated, path, f" of {whose}" if whose else "")
         if direction == "message" and self._directed:
             what = f"{path[-2]} has no direction, which its frame states"
             hint = "add direction: request or direction: response"
             self._report.error("bad-frame", path[:-1], what, hint, of_key=True, needs=(path[:-1], ("frame",)))
             direction = "request"
-        if self._direction is None:
+        if self.direction is None:
             return number
-        return number | self._direction.directions[direction] << self._direction.at
+        return number | self.direction.directions[way or direction] << self.direction.at
 
     def _stated(self, stated: StatedId, path: Path, whose: str) -> int:
         given = stated.given

@@ -126,12 +126,41 @@ class ReplyBuilder:
         fields = (*written.path, "fields")
         spec = written.spec
         number_path = (*written.path, "id")
-        layout = Written(written.name, number, number_path, spec.fields, fields, separator=spec.separator)
+        layout = Written(
+            written.name,
+            number,
+            number_path,
+            spec.fields,
+            fields,
+            separator=spec.separator,
+            way=self._way(written),
+        )
         owner = "" if written.shared else command
         message = self._messages.reply(owner, written.spec, layout, addressing=addressing)
         if written.shared:
             self._shared[written.name] = message
         return message
+
+    def _way(self, written: OfCommand) -> str:
+        """The value of the direction that picks a reply, "" for that of a response."""
+        when, ways = written.spec.when, self._messages.ways
+        if when is None:
+            return ""
+        place, needs = (*written.path, "if"), ((*written.path, "if"), ("frame",))
+        test = when[0]
+        others = {} if ways is None else {each: 0 for each in ways.directions if each not in _TAKEN}
+        if ways is None or len(when) > 1 or test.field != ways.name or test.negated or len(test.wanted) > 1:
+            named = f"the direction, as in {{{ways.name}: NAME}}" if ways else "a part with role: direction"
+            what = f"only a value of the direction can pick {written.name}"
+            self._report.error(_RULE, place, what, f"name {named}; or give it an id or means", needs=needs)
+        elif (name := test.wanted[0].name) in others:
+            return name
+        else:
+            what = f"{test.wanted[0].text} is not another value of {ways.name}"
+            hint = f"its other values are {listed(others)}; add one to its values"
+            self._report.error(_RULE, place, what, hint, needs=needs)
+        self._report.taint(written.path)
+        return ""
 
     def outcome(self, command: str, response: Message | None) -> Reply | None:
         """What the response of a command means, None if it always answers the request."""

@@ -123,6 +123,8 @@ def test_yamspy_reads_a_flight_controller() -> None:
             case codec.SetMotorsRequest(motors=motors):
                 outputs.extend(motors)
                 return codec.SetMotorsResponse()
+            case codec.SaveRequest():
+                return codec.SaveUnsupported()
         return None
 
     outputs: list[int] = []
@@ -137,6 +139,8 @@ def test_yamspy_reads_a_flight_controller() -> None:
             assert master.SENSOR_DATA["kinematics"] == [-12.5, 3.0, 271]
             master.send_RAW_MOTORS([*range(1000, 1800, 100)])
             assert master.receive_msg()["code"] == MSPy.MSPCodes["MSP_SET_MOTOR"]
+            master.send_RAW_msg(MSPy.MSPCodes["MSP_EEPROM_WRITE"])
+            assert master.receive_msg()["unsupported"]
         finally:
             master.conn.close()
     assert outputs == [*range(1000, 1800, 100)]

@@ -65,11 +65,11 @@ def merged(texts: Mapping[str, Mapping[str, str]], ways: Ways) -> str:
             if name in found:
                 text = ways.of(found[name], way)
                 printed.setdefault(ways.of(name, way), text)
-    found, last = "", ""
+    whole, last = "", ""
     for text in printed.values():
         apart = any(each.startswith("def ") for each in (last, text))
-        found, last = f"{found}\n\n\n{text}" if apart else f"{found}\n{text}", text
-    return found
+        whole, last = f"{whole}\n\n\n{text}" if apart else f"{whole}\n{text}", text
+    return whole
 
 
 def _order(first: list[str], other: list[str]) -> list[str]:

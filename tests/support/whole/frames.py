@@ -57,6 +57,8 @@ class Shape:
     text_id: bool = False
     #: A part states the direction, so every message needs one.
     directed: bool = False
+    #: Values of that part that pick replies.
+    ways: list[str] = field(default_factory=list)
 
     @property
     def shares(self) -> bool:
@@ -245,6 +247,7 @@ class _Parts:
             frame["stuffing"] = stuffing
         shape = self._shape(frame, {**names, "message": names["payload"]}, stuffing, strict=False)
         shape.pieces, shape.directed = mixture.pieces, mixture.directed
+        shape.ways = mixture.ways if mixture.directed else []
         shape.id_bits = sum(bits for _, bits in mixture.pieces)
         shape.text_id = "text" in str(mixture.front.get("code", mixture.back.get("code")))
         shape.address_bits, shape.address_name = mixture.address_bits, mixture.address

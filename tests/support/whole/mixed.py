@@ -19,6 +19,7 @@ class Mixture:
         pieces: name and bits of each piece of the message id.
         address: name of the address, "" if there is none.
         directed: whether a part states the direction.
+        ways: its values beyond the two of the directions.
     """
 
     rng: random.Random
@@ -29,6 +30,7 @@ class Mixture:
     address_bits: int = 0
     directed: bool = False
     length: str = ""
+    ways: list[str] = field(default_factory=list)
 
     def draw(self) -> None:
         """Draw all of them."""
@@ -137,7 +139,10 @@ class Mixture:
 
     def _ways(self, bits: int) -> Doc:
         request = self.rng.randrange(min(1 << bits, 256))
-        return {"request": request, "response": request ^ 1}
+        # Without a draw: the schemas of earlier seeds stay what they are.
+        others = {"refused": request ^ 3, "late": request ^ 2} if bits > 1 and request % 2 else {}
+        self.ways = list(others)
+        return {"request": request, "response": request ^ 1, **others}
 
     def _place(self, parts: dict[str, Doc], *, may_trail: bool) -> None:
         names = list(parts)

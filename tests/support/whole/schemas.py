@@ -157,6 +157,8 @@ class _Maker:
             shape.frame["marked"]["checksum"]["only"] = rng.sample(names, rng.randint(1, len(names)))
         if found["commands"] and shape.kind != "packet" and rng.random() < 0.4:
             self._answers(shape, maker, found)
+        if found["commands"] and shape.ways:
+            self._picked(shape, maker, found)
         return {key: value for key, value in found.items() if value or key == "commands"}
 
     def _only(self, shape: Shape, maker: FieldMaker, bus: Doc, taken: set[str], *, attributes: bool) -> Doc:
@@ -320,6 +322,16 @@ class _Maker:
             # A byte at its end tells it from answers without one, by its size or by its number.
             reply["fields"]["told"] = {"type": "u8", "const": self.rng.choice((0, 1, 0xA5))}
             self.rng.choice(answered)["replies"] = {self.words.name(taken): reply}
+
+    def _picked(self, shape: Shape, maker: FieldMaker, found: Doc) -> None:
+        """Replies picked by a value of the part with the direction, for all commands or for one."""
+        taken = {*found["commands"], *found.get("messages", {}), *found.get("replies", {})}
+        taken |= {name for spec in found["commands"].values() for name in spec.get("replies", {})}
+        for way in shape.ways:
+            reply = {"if": {"way": way}, "fields": maker.fields(Room.of(shape))}
+            owner = found if self.rng.random() < 0.6 else self.rng.choice(list(found["commands"].values()))
+            if owner is found or owner["response"] != "none":
+                owner.setdefault("replies", {})[self.words.name(taken | {"request", "response"})] = reply
 
     def _more_of(self, shape: Shape, command: Doc) -> None:
         """Several answers, or one of a size that the request says."""

@@ -740,8 +740,8 @@ def bits_of(spec: Doc) -> Iterator[tuple[str, str, int, int, Doc]]:
         yield name, role, first, last + 1 - first, inner
 
 
-def numbered(document: Doc, given: Any, direction: Direction) -> int:
-    """The number of a message: the direction, then the pieces of its id."""
+def numbered(document: Doc, given: Any, direction: str) -> int:
+    """The number of a message: the direction or another value of its part, then the pieces of its id."""
     number = 0
     parts = document["frame"].get("parts", {})
     if not parts:
@@ -932,7 +932,7 @@ def long_form(given: Any) -> Doc:
     return dict(given) if is_long else {"fields": given}
 
 
-def _number(document: Doc, given: Any, asked: Any, direction: Direction = "response") -> int:
+def _number(document: Doc, given: Any, asked: Any, direction: str = "response") -> int:
     """The number of an answer or a step; `given` is None if it is that of the request."""
     if given is not None and not str(given).startswith("request"):
         return numbered(document, given, direction)
@@ -959,7 +959,8 @@ def _replies(
         if full in known:
             continue
         nodes = (_nodes(document),) if addressed else ()
-        number = _number(document, reply.get("id"), spec.get("id"))
+        way = next(iter(reply.get("if", {"": "response"}).values()))
+        number = _number(document, reply.get("id"), spec.get("id"), way)
         slots = fields.build(reply["fields"])
         checked = _checked(document, key if shared else name)
         default = nodes[0][0] if nodes else 0
