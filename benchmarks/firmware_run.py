@@ -19,7 +19,8 @@ def main(*, write: bool, check: bool) -> int:
     except ToolMissing as missing:
         print(f"firmware: {missing}", file=sys.stderr)
         return 2
-    made = {**tables(measured), "peers": _peers(measured, write)}
+    library = written(PAGE.read_text("utf-8"))["library"]  # measured by benchmarks.firmware_library
+    made = {**tables(measured), "peers": _peers(measured, write), "library": library}
     for name, table in made.items():
         print(f"{name}\n{'=' * len(name)}\n{table}\n")
     if write:

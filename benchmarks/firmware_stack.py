@@ -66,8 +66,10 @@ class CallGraph:
         self.functions = _functions(listing)
         self.measured = usages(stacks or program.parent)
         for name, function in self.functions.items():
-            # A copy made for constant arguments has its own name here, such as wrap.constprop.0.
-            usage = self.measured.get(name, self.measured.get(name.partition(".")[0]))
+            # A copy made for constant arguments has its own name here, such as wrap.constprop.0; the compiler
+            # calls it wrap or wrap.constprop.
+            names = (name, name.rpartition(".")[0], name.partition(".")[0])
+            usage = next((self.measured[each] for each in names if each in self.measured), None)
             if usage is not None:
                 function.frame, function.compiled = usage - target.call, True
             elif function.falls_into:
