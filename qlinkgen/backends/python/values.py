@@ -249,7 +249,7 @@ def _plain_rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Ca
 
 
 def _octets_rule(step: BytesStep, place: Place) -> Call:
-    name, sizes = attribute(step.name), (step.least, step.length.maximum)
+    name, sizes = held(step), (step.least, step.length.maximum)
     if step.excluded:
         return _rule(place, "BetweenRule", name, *sizes, literal(step.excluded))
     rule = _rule(place, "TextRule" if step.text else "BytesRule", name, *sizes)
