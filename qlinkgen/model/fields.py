@@ -111,6 +111,11 @@ class Field:
         return self.optional or bool(self.when)
 
     @property
+    def terminated(self) -> bool:
+        """Whether a character ends it."""
+        return isinstance(self.type, Blob) and bool(self.type.terminator)
+
+    @property
     def min_size(self) -> int:
         """Minimum size on the wire, 0 if it may be absent."""
         return 0 if self.conditional else self.full_min_size

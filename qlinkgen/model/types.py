@@ -321,23 +321,23 @@ class Blob:
     default: bytes = b""
     #: The byte that fills it up to its constant size; not part of the value. b"": it is not filled up.
     pad: bytes = b""
-    #: Characters that a text between separators does not have.
+    #: Characters that a text between separators, or before a terminator, does not have.
     excluded: bytes = b""
+    #: The character that follows it; not part of the value. b"": its size is told otherwise.
+    terminator: bytes = b""
     #: The caller must provide the value: it has no default, and empty is not legal.
     required: bool = False
 
     #: Suffix for the name of its number of items.
     quantity: str = field(default="size", init=False)
 
-    @staticmethod
-    def size_of(number: int) -> int:
+    def size_of(self, number: int) -> int:
         """Size of so many bytes."""
-        return number
+        return number + len(self.terminator)
 
-    @staticmethod
-    def items_in(size: int) -> int:
+    def items_in(self, size: int) -> int:
         """Number of bytes that fit a size."""
-        return size
+        return size - len(self.terminator)
 
 
 @dataclass(frozen=True, slots=True)

@@ -264,7 +264,7 @@ def _octets(step: BytesStep, value: object) -> bytes:
     padded = step.padded(value)
     if step.stripped(padded) != value:
         raise Unsendable(step.name, value)
-    _count(step, padded)
+    _count(step, padded if step.pad else value)
     return padded
 
 

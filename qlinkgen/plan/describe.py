@@ -165,6 +165,7 @@ def type_text(step: Step | Member) -> str:
             return integer_text(step.integer)
         case BytesStep():
             pad = f" padded with {step.pad.hex().upper()}" if step.pad else ""
+            pad += f" ended by {step.terminator.hex().upper()}" if step.terminator else ""
             return f"{'text' if step.text else 'bytes'}[{_length_text(step.length)}]{pad}"
         case ItemsStep():
             row = f" in a row of bits, {step.packed} first" if step.packed else ""
@@ -557,6 +558,7 @@ def segment_text(segment: Segment) -> str:
         size = f"{segment.size} bytes" if segment.size != 1 else "1 byte"
     else:
         size = f"{run.item_size}*{run.name}" if run.item_size > 1 else run.name
+        size += f" and {segment.terminator.hex().upper()}" if segment.terminator else ""
         if segment.rest is not None:
             rest = size_text(segment.rest)
             size = f"the rest{f' but {rest} bytes' if rest != '0' else ''}"

@@ -179,8 +179,10 @@ class BytesStep:
     default: bytes
     #: The byte that fills up a shorter value, which does not end with it; b"" if there is none.
     pad: bytes
-    #: Characters that a text between separators does not have.
+    #: Characters that a text between separators, or before a terminator, does not have.
     excluded: bytes
+    #: The character that follows it; b"" if there is none.
+    terminator: bytes
     required: bool
     presence: Presence | None = None
 
@@ -203,11 +205,11 @@ class BytesStep:
 
     def padded(self, value: bytes) -> bytes:
         """The bytes on the wire of a value."""
-        return value.ljust(self.length.maximum, self.pad) if self.pad else value
+        return value.ljust(self.length.maximum, self.pad) if self.pad else value + self.terminator
 
     def stripped(self, data: bytes) -> bytes:
         """The value of bytes on the wire."""
-        return data.rstrip(self.pad) if self.pad else data
+        return data.rstrip(self.pad) if self.pad else data.removesuffix(self.terminator)
 
 
 @dataclass(frozen=True)
@@ -330,6 +332,12 @@ class Segment:
     presence: Presence | None
     size: int | None
     rest: Size | None = None
+
+    @property
+    def terminator(self) -> bytes:
+        """The character that ends its text, b"" for other segments."""
+        run = self.run
+        return run.terminator if isinstance(run, BytesStep) else b""
 
     @property
     def run(self) -> RunStep | None:

@@ -66,7 +66,7 @@ class _Planner:
         self._fields = {field.name: field for field in fields}
 
     def plan(self, *, empty_is_default: bool = False) -> PayloadPlan:
-        if any(field.conditional for field in self._all):
+        if any(field.conditional or field.terminated for field in self._all):
             return self._walked()
         front, steps = Size(), []
         for index, field in enumerate(self._all):
@@ -130,6 +130,8 @@ class _Planner:
         kind = field.type
         if not isinstance(kind, Blob | Array | Records) or kind.length.fixed:
             return Segment((step,), presence, field.max_size)
+        if field.terminated:
+            return Segment((step,), presence, None)
         # A field after the rest that may be absent is absent where the rest is present.
         always = tuple(each for each in after if not each.conditional)
         return Segment((step,), presence, None, None if kind.length.counted_by else _size_of(always))
@@ -150,6 +152,7 @@ class _Planner:
                     kind.default,
                     kind.pad,
                     kind.excluded,
+                    kind.terminator,
                     kind.required,
                 )
             case Array():

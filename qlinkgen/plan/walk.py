@@ -86,6 +86,8 @@ class Walk:
             return segment.size
         run = segment.run
         assert run is not None
+        if segment.terminator:
+            raise AssertionError(f"the bytes tell the size of {run.name}")
         if segment.rest is None:
             size = self.counts[run.name] * run.item_size
             if left < size:
@@ -164,7 +166,10 @@ def visit(plan: PayloadPlan, payload: bytes) -> Iterator[Visit]:
         if not present(segment.presence, walk.numbers, len(payload) - at):
             yield from (Visit(step, at, None) for step in segment.steps)
             continue
-        size = walk.size(segment, at, len(payload) - at)
+        if segment.terminator:
+            size = _terminated(segment, payload, at)
+        else:
+            size = walk.size(segment, at, len(payload) - at)
         for step in segment.steps:
             begin = at + step.place.front.fixed
             data = payload[begin : begin + (size if segment.size is None else full_size(step))]
@@ -173,6 +178,16 @@ def visit(plan: PayloadPlan, payload: bytes) -> Iterator[Visit]:
         at += size
     if at != len(payload):
         raise Wrong("", at)
+
+
+def _terminated(segment: Segment, payload: bytes, at: int) -> int:
+    """The size of a text with its terminator. Raises Wrong."""
+    run = segment.run
+    assert run is not None
+    count = payload[at : at + run.length.maximum + 1].find(segment.terminator)
+    if count < run.length.minimum:
+        raise Wrong(run.name, at, segment.steps)
+    return count + 1
 
 
 def measure(plan: PayloadPlan, start: bytes) -> int:

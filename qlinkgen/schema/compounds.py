@@ -81,12 +81,42 @@ def build_blob(spec: FieldSpec, text: TypeText, payload_max: int, location: Loca
     length = build_length(text, 8, payload_max, location)
     if length is None:
         return None
+    if spec.terminator is not None:
+        return _terminated(spec, spec.terminator, text, length, location)
     if spec.pad is not None:
         return _padded(spec, spec.pad, text, length, location)
     default = _blob_default(spec, text, length, location)
     fill = b" " if text.base == "text" else b"\0"
     required = spec.default is None and length.minimum > 0
     return Blob(text.base == "text", length, default.ljust(length.minimum, fill), required=required)
+
+
+def _terminated(
+    spec: FieldSpec, terminator: bytes, text: TypeText, length: Length, location: Location
+) -> Blob:
+    """Text of variable size that a character ends."""
+
+    def wrong(what: str, hint: str) -> None:
+        location.key_fault("bad-terminated", "terminator", what, hint)
+
+    if text.base != "text":
+        wrong("bytes may contain every byte", "use text, or give the bytes a count")
+    elif spec.pad is not None:
+        wrong("a text is padded or terminated", "remove one of both")
+    elif not (text.count or "").strip():
+        wrong("the text has no greatest size", "write one, like text[0..16]")
+    elif length.fixed:
+        wrong("a text of constant size has no end of its own", f"write text[0..{length.maximum}], or pad")
+    if len(terminator) != 1 or terminator > b"\x7f":
+        wrong("the terminator is not one 7-bit character", "write one, like 00 or 0D")
+    default = _blob_default(spec, text, length, location)
+    if terminator in default:
+        wrong("the default contains the terminator", "use other characters")
+    fill = b" " if terminator != b" " else b"_"
+    required = spec.default is None and length.minimum > 0
+    return Blob(
+        True, length, default.ljust(length.minimum, fill), b"", terminator[:1], terminator[:1], required
+    )
 
 
 def _padded(spec: FieldSpec, pad: bytes, text: TypeText, length: Length, location: Location) -> Blob:

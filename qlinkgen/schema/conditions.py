@@ -207,4 +207,5 @@ def _is_packed_run(field: Field) -> bool:
 
 def _is_run(field: Field) -> bool:
     """Whether the number of items varies."""
-    return isinstance(field.type, Blob | Array | Records) and not field.type.length.fixed
+    run = isinstance(field.type, Blob | Array | Records) and not field.type.length.fixed
+    return run and not field.terminated

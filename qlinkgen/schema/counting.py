@@ -54,6 +54,9 @@ def _fault(
         if name not in known:
             hint = did_you_mean(name, known, f"the fields are {listed(known)}")
             return f"{shown(name)} is not a field that it can count", hint
+        if known[name].terminated:
+            what = f"{name} has a terminator, which tells its size"
+            return what, "count other fields, or remove the terminator"
         if names.count(name) > 1:
             return f"{name} is counted twice", "remove one of them"
         if name not in varying and (specs[name].when or specs[name].optional):

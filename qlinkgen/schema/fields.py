@@ -138,6 +138,11 @@ class FieldBuilder:
             self._report.error("bad-count", path, *of_choice(count.run), needs=needs)
             self._report.taint(path)
             return False
+        if target is not None and target.terminated:
+            what = f"{target.name} has a terminator, which tells its size"
+            self._report.error("bad-count", path, what, "remove the count, or the terminator", needs=needs)
+            self._report.taint(path)
+            return False
         if target is None or not isinstance(target.type, Blob | Array | Records) or target.type.length.fixed:
             known = [name for name, other in later.items() if not other.fixed]
             hint = did_you_mean(count.run, known, f"fields of variable size: {listed(known)}")
@@ -175,6 +180,14 @@ class FieldBuilder:
                 "two-open-ends", (*path, name), what, hint, of_key=True, needs=(*needs, *counts)
             )
             self._report.taint((*path, name))
+        for field in open_fields:
+            later = fields[fields.index(field) + 1 :]
+            ended = (each for each in later if each.terminated and not exclusive(each.when, field.when))
+            if other := next(ended, None):
+                what = f"{field.name} takes the rest of the payload, before {other.name}, whose size varies"
+                both = ((*path, field.name), (*path, other.name), *counts)
+                hint = f"move {other.name} before it, or give {field.name} a count"
+                self._report.error("two-open-ends", (*path, other.name), what, hint, of_key=True, needs=both)
         if open_ends:
             self._check_later_counts(open_ends[0], fields, path, counts)
 
@@ -257,4 +270,5 @@ def is_open(field: Field) -> bool:
         isinstance(field.type, Blob | Array | Records)
         and not field.type.length.fixed
         and not field.type.length.counted_by
+        and not field.terminated
     )

@@ -109,6 +109,9 @@ class FieldSpec(Fact, Lifetime):
     pad: ByteText | None = Field(
         default=None, description="Byte that fills up text or bytes of a constant size; not part of the value"
     )
+    terminator: ByteText | None = Field(
+        default=None, description="Character that follows a text of variable size; not part of the value"
+    )
     as_: str | None = Field(
         default=None,
         alias="as",

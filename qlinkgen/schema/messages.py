@@ -302,7 +302,7 @@ class MessageBuilder:
         ):
             return
         for field in message.fields:
-            if is_open(field) and not message.separator:
+            if (is_open(field) or field.terminated) and not message.separator:
                 neither = f"neither the frame nor {message.name} has a length"
                 what = f"the end of {field.name} is unknown: {neither}"
                 hint = "give it a count or a fixed size, or give the frame a length or terminator"

@@ -159,6 +159,11 @@ _ALL = (
         "the same roles; what a part counts, covers or equals is there wherever the part is.",
     ),
     Rule(
+        "bad-terminated",
+        "A terminator is a character that follows a text of variable size, and does not occur in it.",
+        "A receiver finds the end of the text by it, and needs room for the longest one.",
+    ),
+    Rule(
         "bad-switch",
         "The cases of a choice exclude each other, and there is one for every value of an earlier field.",
         "Encoders and receivers choose the case by that field, which is always present: a whole number, an "

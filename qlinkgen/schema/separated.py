@@ -62,6 +62,10 @@ def _checked(field: Field, separator: bytes, excluded: bytes, path: Path, report
         what = f"{field.slot} is a choice between separators"
         report.error(_RULE, path, what, "use a message for each case", of_key=True)
         return field
+    if field.terminated:
+        what = f"the separator ends {field.name}, which has a terminator too"
+        report.error(_RULE, path, what, "remove terminator", of_key=True)
+        return field
     if isinstance(kind, Blob) and kind.text and not kind.pad:
         if field.optional and not kind.length.minimum:
             what = f"an empty {field.name} is the same as an absent one"

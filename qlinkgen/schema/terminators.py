@@ -151,7 +151,7 @@ def bytes_in(field: Field) -> Alphabet:
     kind = field.type
     match kind:
         case Blob():
-            return frozenset(range(0x80)) - {*kind.excluded} if kind.text else ALL_BYTES
+            return frozenset(range(0x80)) - {*kind.excluded} | {*kind.terminator} if kind.text else ALL_BYTES
         case Array():
             return ALL_BYTES if kind.packed else _bytes_of_number(kind.item)
         case Bits():

@@ -124,7 +124,7 @@ class TypeBuilder:
             self._note_unbounded(text, location)
             return self._blob(spec, text, location)
         plain = self._scalars.named(text.base, location, text.count)
-        location.reject(spec, ("pad",), "numbers")
+        location.reject(spec, ("pad", "terminator"), "numbers")
         if plain is None:
             return None
         if text.count is not None:

@@ -71,7 +71,8 @@ def _wire_type(step: Step) -> str:
     match step:
         case BytesStep():
             pad = f" padded with {step.pad.hex().upper()}" if step.pad else ""
-            return f"{'text' if step.text else 'bytes'}[{_length(step.length)}]{pad}"
+            end = f" ended by {step.terminator.hex().upper()}" if step.terminator else ""
+            return f"{'text' if step.text else 'bytes'}[{_length(step.length)}]{pad}{end}"
         case ItemsStep():
             order = f" in a row, {step.packed} first" if step.packed else _order(step.item)
             return f"{_integer(step.item)}[{_length(step.length)}]{order}"

@@ -87,10 +87,7 @@ class Encoder:
                 for member in step.members:
                     self._check_value(member)
             case BytesStep():
-                if step.text:
-                    octets = f"message->{member_of(step)}"
-                    text = f"{self.layouts.prefix}_is_text_({octets}, {self._number_of(step)})"
-                    self._refuse([f"!{text}"], "RANGE")
+                self._check_octets(step)
             case ItemsStep():
                 terms = checks.refused_before_sending(step.number, f"message->{member_of(step)}[index]")
                 refusal = checks.refusal(terms, f"{self.layouts.prefix.upper()}_ERROR_RANGE")
@@ -104,6 +101,13 @@ class Encoder:
                 pass
             case _:
                 assert_never(step)
+
+    def _check_octets(self, step: BytesStep) -> None:
+        octets, count = f"message->{member_of(step)}", self._number_of(step)
+        if step.terminator:
+            self._refuse([self.layouts.has_octet(octets, count, step.terminator[0])], "RANGE")
+        if step.text:
+            self._refuse([f"!{self.layouts.prefix}_is_text_({octets}, {count})"], "RANGE")
 
     def _check_value(self, value: ValueStep | Member) -> None:
         self._refuse(checks.refused_before_sending(value.number, f"message->{member_of(value)}"), "RANGE")
@@ -138,8 +142,7 @@ class Encoder:
             case BitsStep():
                 self._put(step.place, step.integer, _whole(step))
             case BytesStep():
-                index = index_of(step.place, local_size, "index")
-                self.lines += self._loop(step, [f"payload[{index}] = message->{member_of(step)}[index];"])
+                self._write_octets(step)
             case ItemsStep() if step.packed:
                 self._write_row(step, step.packed)
             case ItemsStep():
@@ -157,6 +160,13 @@ class Encoder:
                 self.lines += self._loop(step, [call])
             case _:
                 assert_never(step)
+
+    def _write_octets(self, step: BytesStep) -> None:
+        index = index_of(step.place, local_size, "index")
+        self.lines += self._loop(step, [f"payload[{index}] = message->{member_of(step)}[index];"])
+        if step.terminator:
+            end = unsigned(step.terminator[0], 8, hexadecimal=True)
+            self.lines.append(f"payload[{local(step.name)}] = {end};")
 
     def _write_fixed(self, step: ConstantStep | ReservedStep) -> None:
         if step.integer.bits > 64:

@@ -291,7 +291,7 @@ class MessageWriter:
                 items = ", ".join([self._record_init(each)] * max(1, least))
                 return f"{{{items}}}" if each.fixed else f"{least}U, {{{items}}}"
             case BytesStep():
-                default: Sequence[int] = each.padded(each.default)
+                default: Sequence[int] = each.padded(each.default) if each.pad else each.default
                 octets = [unsigned(byte, 8, hexadecimal=True) for byte in default]
             case ItemsStep():
                 default = each.default

@@ -10,7 +10,7 @@ from qlinkgen.backends.c.conditions import condition, numbers_of
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.encode import Encoder
 from qlinkgen.backends.c.members import count_of
-from qlinkgen.backends.c.names import count_type, grouped
+from qlinkgen.backends.c.names import count_type, grouped, unsigned
 from qlinkgen.backends.c.sizes import local, local_size, size_text, term_text
 from qlinkgen.model import naming
 from qlinkgen.model.types import Scalar
@@ -45,6 +45,8 @@ def _struct_size(segment: Segment) -> str:
     run = segment.run
     assert run is not None
     count = f"(size_t)message->{count_of(run)}"
+    if segment.terminator:
+        return f"{count} + 1U"
     return f"{run.item_size}U * {count}" if run.item_size > 1 else count
 
 
@@ -132,6 +134,8 @@ def _length(segment: Segment, count: Callable[[str], str]) -> str:
     run = segment.run
     if run is None:
         return f"{segment.size}U"
+    if segment.terminator:
+        return f"{count(run.name)} + 1U"
     return f"{run.item_size}U * {count(run.name)}" if run.item_size > 1 else count(run.name)
 
 
@@ -161,7 +165,9 @@ class WalkedDecoder(Decoder):
 
     def _segment(self, segment: Segment, numbers: dict[str, Scalar]) -> list[str]:
         run = segment.run
-        if run is not None and segment.rest is not None:
+        if run is not None and segment.terminator:
+            self._find_end(run, segment.terminator[0])
+        elif run is not None and segment.rest is not None:
             self._infer_rest(run, segment.rest)
         else:
             self.refuse([f"size < {_length(segment, local)}"], "LENGTH")
@@ -176,6 +182,18 @@ class WalkedDecoder(Decoder):
         if not member:
             return _guarded(test, inner)
         return [f"message->{member} = {test};", *_guarded(f"message->{member}", inner)]
+
+    def _find_end(self, run: RunStep, terminator: int) -> None:
+        """Find the terminator of a text."""
+        length, name = run.length, local(run.name)
+        end = unsigned(terminator, 8, hexadecimal=True)
+        self.lines += [
+            f"while (({name} < size) && ({name} <= {length.maximum}U) && (payload[{name}] != {end})) {{",
+            f"    ++{name};",
+            "}",
+        ]
+        low = [f"{name} < {length.minimum}U"] if length.minimum else []
+        self.refuse([f"{name} == size", *low, f"{name} > {length.maximum}U"], "LENGTH")
 
     def _infer_rest(self, run: RunStep, after: Size) -> None:
         length, name = run.length, local(run.name)

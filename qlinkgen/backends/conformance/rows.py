@@ -278,7 +278,8 @@ def _value(header: Header, value: Value, step: Holder, fields: JsonObject, raw: 
             return number_bytes(number, header.width(step.number))
         case BytesStep():
             assert isinstance(native, bytes | str)
-            items = step.padded(native.encode("ascii") if isinstance(native, str) else native)
+            items = native.encode("ascii") if isinstance(native, str) else native
+            items = step.padded(items) if step.pad else items
         case ItemsStep():
             assert isinstance(native, list)
             raws = raw if isinstance(raw, list) else None

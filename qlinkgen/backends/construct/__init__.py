@@ -40,7 +40,7 @@ _SUPPORT = {
     "_frecords": "Record",
     "_ftexts": "BetweenField Separated TextNumber",
     "_ftrimmed": "Trimmed",
-    "_fwalks": "Walked",
+    "_fwalks": "TerminatedText Walked",
 }
 #: Copied only if a tree uses them.
 _OPTIONAL = tuple(name for name in _SUPPORT if name not in ("_fields", "_frames"))

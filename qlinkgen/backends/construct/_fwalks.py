@@ -17,12 +17,45 @@ from construct import (
     stream_write,
 )
 
-from ._fields import BitFields, Bits, Count, Groups, Message, Values, _signed
+from ._fields import (
+    BitFields,
+    Bits,
+    Count,
+    Groups,
+    Message,
+    Row,
+    TextField,
+    Values,
+    _signed,
+)
 
 #: A test of an earlier value: its name, ranges of raw numbers, whether they are excluded.
 Test = tuple[str, Sequence[tuple[int, int]], bool]
 #: A field that may be absent: its name, what decides (() if it is optional), whether it is sent by default.
 Presence = tuple[str, Sequence[Test], bool]
+
+
+class TerminatedText(TextField):
+    """Text of 7-bit characters that one more ends, which it does not contain."""
+
+    def __init__(self, terminator: bytes, minimum: int, maximum: int) -> None:
+        super().__init__(minimum, maximum)
+        self.terminator = terminator
+
+    def extent(self, number: int) -> int:
+        """Size of so many characters with their terminator."""
+        return number + 1
+
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> str:
+        data: bytes = stream_read_entire(stream, path)
+        return super()._parse(BytesIO(data[:-1]), context, path)
+
+    def _build(self, obj: Row, stream: BinaryIO, context: Container, path: str) -> Row:
+        super()._build(obj, stream, context, path)
+        if isinstance(obj, str) and self.terminator.decode() in obj:
+            raise ValidationError(f"{obj!r} has its terminator in it", path=path)
+        stream_write(stream, self.terminator, 1, path)
+        return obj
 
 
 class Walked(Message):
@@ -153,7 +186,7 @@ class Walked(Message):
                     dict.fromkeys(name for each in segment for name in _values(each))
                 )
                 continue
-            self._infer(segment[0], counts, left, path)
+            self._infer(segment[0], counts, data[at:], path)
             if left < (needed := sum(self._size(each, counts) for each in segment)):
                 raise RangeError(
                     f"{left} bytes are left, {segment[0].name} needs {needed}",
@@ -174,11 +207,14 @@ class Walked(Message):
         return Container(self._by_value(values)) if self.slots else values
 
     def _infer(
-        self, field: Renamed, counts: dict[str, int], left: int, path: str
+        self, field: Renamed, counts: dict[str, int], data: bytes, path: str
     ) -> None:
-        """The number of items of a run that takes the rest of the payload."""
-        run = self.runs.get(field.name)
+        """The number of items of a run that takes the rest of the payload, or has a terminator."""
+        run, left = self.runs.get(field.name), len(data)
         if run is None or field.name in counts:
+            return
+        if isinstance(run, TerminatedText):
+            counts[field.name] = run.checked(data.find(run.terminator), path)
             return
         # A field after the rest that may be absent is absent where the rest is present.
         after = self.fields[self.fields.index(field) + 1 :]

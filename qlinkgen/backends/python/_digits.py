@@ -46,7 +46,7 @@ def start_of(texts: Sequence[bytes], index: int) -> int:
 
 
 class BetweenRule(TextRule):
-    """Text between separators: of seven-bit characters, without some of them."""
+    """Text of seven-bit characters without some of them: those that separate or end it."""
 
     __slots__ = ("excluded",)
 

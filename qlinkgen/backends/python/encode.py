@@ -341,6 +341,8 @@ class Encoder:
             # struct fills up with zeros.
             filled = f"{raw}.ljust({step.length.maximum}, {literal(step.pad)})"
             self._add(f"{step.length.maximum}s", filled if step.pad.strip(b"\0") else raw)
+        elif step.terminator:
+            self._pieces.append(f"{step.name}_raw + {literal(step.terminator)}")
         else:
             self._pieces.append(f"{step.name}_raw")
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from qlinkgen.backends.python import integers
 from qlinkgen.backends.python.decode import Decoder, assigned_targets, divided
 from qlinkgen.backends.python.encode import Encoder, Row
-from qlinkgen.backends.python.layout import bare, indented
+from qlinkgen.backends.python.layout import bare, indented, literal
 from qlinkgen.backends.python.names import attribute, held, source_of
 from qlinkgen.backends.python.structs import format_of
 from qlinkgen.backends.python.values import condition_text
@@ -82,6 +82,8 @@ class WalkedEncoder(Encoder):
         self._lines.append(f"{run.name}_count = len({source})")
         bounds = Within(run.length.minimum, run.length.maximum)
         self._terms.append(integers.holds(bounds, f"{run.name}_count"))
+        if isinstance(run, BytesStep) and run.terminator:
+            self._terms.append(f"{literal(run.terminator)} not in {source}")
         lines = self._flushed()
         if run.presence is None or run.presence.slot:
             return lines
@@ -210,7 +212,9 @@ class WalkedDecoder(Decoder):
         run = segment.run
         lines = [] if run is None else self._measured(run, segment)
         size = str(segment.size) if run is None else _times(run)
-        if run is None or segment.rest is None:
+        if segment.terminator:
+            size += " + 1"
+        elif run is None or segment.rest is None:
             lines += [f"if end - at < {size}:", self._bad_layout]
         for step in segment.steps:
             self._step(step)
@@ -236,7 +240,12 @@ class WalkedDecoder(Decoder):
         return [*lines, "else:", f"    message.{held(cases[0].steps[0])} = None"]
 
     def _measured(self, run: RunStep, segment: Segment) -> list[str]:
-        """The statements that count a run which takes the rest."""
+        """The statements that count a run which takes the rest, or ends with a terminator."""
+        if segment.terminator:
+            count, data = f"{run.name}_count", f"bytes({self.place.data}[at:end])"
+            bounds = Within(run.length.minimum, run.length.maximum)
+            found = f"{count} = {data}.find({literal(segment.terminator)})"
+            return [found, f"if {integers.broken(bounds, count)}:", self._bad_layout]
         if segment.rest is None:
             return []
         rest = integers.size_text(segment.rest)

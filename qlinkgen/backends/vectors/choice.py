@@ -56,6 +56,11 @@ class Chance:
 _MASK = (1 << 64) - 1
 
 
+def _without(terminator: bytes) -> bytes | None:
+    """The table that replaces a byte of a text by its neighbour."""
+    return bytes.maketrans(terminator, bytes((terminator[0] ^ 1,))) if terminator else None
+
+
 class Rule:
     """The rule for the values of one kind of vector."""
 
@@ -109,6 +114,7 @@ class Rule:
             case BytesStep():
                 mask = 0x7F if step.text else 0xFF
                 octets = bytes(self._octet(i) & mask for i in range(self._count(step.length)))
+                octets = octets.translate(_without(step.terminator))
                 return {step.name: step.stripped(octets)}
             case ItemsStep():
                 bits, count = self._bits(step.item), whole(step, self._count(step.length))

@@ -66,6 +66,8 @@ def _value(kind: Value, rng: random.Random, mark: int) -> Raw:
     limit = 0x7F if kind.text else 0xFF
     count = rng.randint(0, kind.most) if kind.pad else count
     value = bytes(rng.choice((rng.randint(0, limit), mark & limit, 0, limit)) for _ in range(count))
+    if kind.end:
+        value = value.replace(kind.end, bytes([kind.end[0] ^ 1]))
     return value.rstrip(kind.pad) if kind.pad else value
 
 

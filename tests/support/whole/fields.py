@@ -820,6 +820,9 @@ class FieldMaker:
         if rng.random() < 0.15 and not self.shape.groups:
             self._row(name, made, taken, room)
             return
+        if rng.random() < 0.15 and self.shape.text and self.shape.has_length:
+            self._terminated(name, made, room)
+            return
         kind, spec, step = self._variable_kind()
         most = min(rng.choice((1, 3, 8, 40, 250)), (room.left - room.least - 4) // step)
         if most < 1:
@@ -842,10 +845,26 @@ class FieldMaker:
         room.left -= most * step
         room.open_end = room.open_end and counted
 
+    def _terminated(self, name: str, made: list[tuple[str, Any]], room: Room) -> None:
+        """A text that a character ends, before a field that takes the rest."""
+        rng = self.rng
+        most = min(rng.choice((1, 3, 8, 40)), room.left - room.least - 1)
+        if most < 1:
+            return
+        low = rng.choice((0, 0, min(1, most - 1)))
+        spec: Doc = {"type": f"text[{low}..{most}]", "terminator": rng.choice(("00", "0D", "20"))}
+        if rng.random() < 0.3:
+            spec["default"] = "a"
+        opened = next((at for at, (_, each) in enumerate(made) if self._is_open(each, made)), len(made))
+        made.insert(rng.randint(0, opened), (name, spec))
+        room.left -= most + 1
+
     def _is_open(self, spec: Any, made: list[tuple[str, Any]]) -> bool:
         names = {each["counts"] for _, each in made if isinstance(each, dict) and "counts" in each}
         kind = str(spec["type"] if isinstance(spec, dict) else spec)
         kind = kind.replace("[]", "[..]")
+        if isinstance(spec, dict) and "terminator" in spec:
+            return False
         own = next(name for name, each in made if each is spec)
         return (kind in ("bytes", "text") or ".." in kind) and own not in names
 

@@ -105,6 +105,8 @@ class Run:
     packed: str = ""
     #: The byte that fills up a shorter value.
     pad: bytes = b""
+    #: The character after a text, which the text does not contain.
+    end: bytes = b""
 
     @property
     def step(self) -> int:
@@ -113,7 +115,9 @@ class Run:
 
     def bytes_of(self, number: int) -> int:
         """Size of so many items."""
-        return -(-number * self.item.bits // 8) if self.packed and self.item else number * self.step
+        if self.packed and self.item:
+            return -(-number * self.item.bits // 8)
+        return number * self.step + len(self.end)
 
     def items_in(self, size: int) -> int:
         """Number of items that fit."""
@@ -312,7 +316,7 @@ class Message:
     @property
     def walked(self) -> bool:
         """Whether fields may be absent."""
-        return any(slot.conditional for slot in self.slots)
+        return any(slot.conditional or (isinstance(slot.kind, Run) and slot.kind.end) for slot in self.slots)
 
     @property
     def sizes(self) -> tuple[int, int]:
@@ -605,6 +609,10 @@ class Fields:
         fill = item.default if item else ord(" ") if base == "text" else 0
         if "pad" in spec:
             return Run(item, base == "text", low, high, default, pad=octets(spec["pad"]))
+        if "terminator" in spec:
+            end = octets(spec["terminator"])
+            fill = ord("_") if end == b" " else fill
+            return Run(item, base == "text", low, high, default + (fill,) * (low - len(default)), end=end)
         filled = default + (fill,) * (low - len(default))
         return Run(item, base == "text", low, high, filled, spec.get("packed", ""))
 

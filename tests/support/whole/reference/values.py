@@ -235,7 +235,9 @@ def _encoded_run(kind: Run, given: Raw) -> bytes:
     assert isinstance(given, bytes)
     if kind.text and any(each > 0x7F for each in given):
         raise Wrong("range", "text")
-    return given
+    if kind.end and kind.end in given:
+        raise Wrong("range", "terminator")
+    return given + kind.end
 
 
 def decode(message: Message, payload: bytes) -> dict[str, Raw]:
@@ -279,7 +281,9 @@ def _walked(message: Message, payload: bytes) -> dict[str, Raw]:
             values |= dict.fromkeys(name for name, _ in first.values())
             continue
         sizes = [_size(slot, counted) for slot in segment]
-        if sizes == [None]:
+        if isinstance(first.kind, Run) and first.kind.end:
+            sizes = [_ended(first.kind, payload[at:])]
+        elif sizes == [None]:
             behind = message.slots[message.slots.index(first) + 1 :]
             sizes = [left - _behind([slot for slot in behind if not slot.conditional], counted)]
             _demand(first.kind, sizes[0] or 0)
@@ -299,6 +303,14 @@ def _walked(message: Message, payload: bytes) -> dict[str, Raw]:
     if at != len(payload):
         raise Wrong("length", "bytes are left")
     return values
+
+
+def _ended(kind: Run, left: bytes) -> int:
+    """The size of a text with its terminator. Raises Wrong."""
+    count = left[: kind.most + 1].find(kind.end)
+    if count < kind.low:
+        raise Wrong("length", "no terminator")
+    return count + 1
 
 
 def note(slot: Slot, data: bytes, numbers: dict[str, int]) -> None:
@@ -369,7 +381,7 @@ def _decoded_run(kind: Run, data: bytes, number: int) -> Raw:
             raise Wrong("range", "text")
         while kind.pad and data.endswith(kind.pad):
             data = data[:-1]
-        return data
+        return data[:-1] if kind.end else data
     items = []
     for at in range(0, len(data), kind.step):
         piece = data[at : at + kind.step]
