@@ -14,11 +14,12 @@ from qlinkgen.link.health import HealthPolicy
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.monitor import Monitor
 from qlinkgen.link.procedure import Ask, Pause, Procedure, Tell
-from qlinkgen.link.slave import Node, Refusal, SlaveEngine
+from qlinkgen.link.slave import PENDING, Node, Refusal, SlaveEngine
 from qlinkgen.link.timing import Timing
 from qlinkgen.link.transaction import Reply
 
 __all__ = [
+    "PENDING",
     "Ask",
     "Dialogue",
     "EchoMode",

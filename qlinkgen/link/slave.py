@@ -8,10 +8,10 @@ from typing import Any, Literal, Protocol
 from qlinkgen.link.codec import Codec, Framed, Message, address_of, is_message, wrong_size
 from qlinkgen.link.echo import EchoCanceller
 from qlinkgen.link.numbering import numbering_of
-from qlinkgen.link.slave_dialogue import Answers, Handling, Refusal, SlaveDialogue
+from qlinkgen.link.slave_dialogue import PENDING, Answers, Handling, Refusal, SlaveDialogue
 from qlinkgen.link.unknown import unknown_requests
 
-__all__ = ["Node", "Refusal", "SlaveCounters", "SlaveEngine"]
+__all__ = ["PENDING", "Node", "Refusal", "SlaveCounters", "SlaveEngine"]
 
 
 class Node(Protocol):
@@ -182,7 +182,7 @@ class SlaveEngine:
             self.counters.foreign += 1
             return
         self._request = request
-        if response is not None:
+        if response is not None and response is not PENDING:
             self._queue(request, response, now)
             inserted = self._encode(request)[-1:] != self._last
             self._due = now + self._turnaround + (self._byte_time if inserted else 0.0)

@@ -14,6 +14,18 @@ Answers: TypeAlias = Message | Sequence[Message] | None
 Handling = Generator[Answers, Any, Answers]  # Any: a message of the class of the step
 
 
+class _Pending:
+    """What a handler returns that answers later."""
+
+    def __repr__(self) -> str:
+        return "PENDING"
+
+
+#: Returned by a handler that answers later, with `SlaveEngine.answer`. Any: handlers return messages of their
+#: protocol.
+PENDING: Any = _Pending()
+
+
 class Refusal(Exception):  # the outcome of a request, not an error of the program
     """Raised by a handler to answer with another reply than the response.
 

@@ -46,7 +46,7 @@ static bool on_read(pump_slave_t *slave, const pump_read_request_t *request, pum
         response->value = request->number;
         return true;
     }
-    return (request->number < 7U) ? pump_read_fault_answer(slave, &fault) : false;
+    return (request->number < 7U) ? pump_read_fault_answer(slave, &fault) : PUMP_PENDING;
 }
 
 static bool on_set(pump_slave_t *slave, const pump_set_request_t *request)

@@ -11,7 +11,7 @@ import pytest
 from qlinkgen.backends.python import load as load_codec
 from qlinkgen.cli.decode import message_record
 from qlinkgen.errors import BadReply, NoReply, Refused
-from qlinkgen.link import HealthPolicy, MasterEngine, Monitor, Refusal, SlaveEngine, Timing
+from qlinkgen.link import PENDING, HealthPolicy, MasterEngine, Monitor, Refusal, SlaveEngine, Timing
 from qlinkgen.link.events import Failed, OtherAnswer, Stray
 from qlinkgen.link.monitor import Replied, Unanswered
 from qlinkgen.schema import loads
@@ -233,6 +233,9 @@ class Handlers:
             return pump.ReadFault(node=3, number=1, reason=1)
         if request.number == 2:
             raise Refusal(pump.Nak(node=3))
+        if request.number == 4:
+            self.later.append(request)
+            return PENDING
         if request.number == 3:
             self.later.append(request)
             return pump.ReadFault(node=3, number=3, reason=3)
@@ -250,6 +253,16 @@ def test_a_slave_refuses_by_returning_or_raising(pump: ModuleType) -> None:
         reply: Any = caught.value.reply
         assert name == reply.NAME
     assert master.transact(ask(pump, 9)).response.number == 9
+
+
+def test_a_slave_sends_nothing_before_it_answers(pump: ModuleType) -> None:
+    node = Handlers(pump)
+    slave = SlaveEngine(pump, node, baud=BAUD)
+    slave.receive(ask(pump, 4).to_frame(), 0.0)
+    assert slave.bytes_to_send(1.0) == b""
+    late = pump.ReadResponse(node=3, number=4, value=1)
+    slave.answer(node.later[0], late, 1.0)
+    assert slave.bytes_to_send(1.0) == late.to_frame()
 
 
 def test_a_slave_answers_later(pump: ModuleType) -> None:
