@@ -22,9 +22,19 @@ from collections.abc import Mapping, Sequence
 
 from qlinkgen.errors import BadReply, Collision, LinkError, NoReply
 from qlinkgen.errors import Refused as RequestRefused
-from qlinkgen.link.asked import AskedDecoder, answer_to
+from qlinkgen.link.asked import AskedDecoder, NotAnAnswer, answer_to
 from qlinkgen.link.attempts import Attempts
-from qlinkgen.link.codec import Codec, Fault, Framed, OtherReply, address_getter, cut, is_message, reason_of
+from qlinkgen.link.codec import (
+    Codec,
+    Fault,
+    Framed,
+    OtherReply,
+    address_getter,
+    cut,
+    is_message,
+    reason_of,
+    wrong_size,
+)
 from qlinkgen.link.counters import LinkCounters
 from qlinkgen.link.dialogue import Conversation, Dialogue, Further
 from qlinkgen.link.echo import PROBE, EchoCanceller, EchoMode, EchoProbe
@@ -531,12 +541,27 @@ class MasterEngine:
         count = self.counters.get(node) or self.counters[None]
         earlier, sent = self._earlier, self._attempts.number > 0
         asked = sent and self._pending.may_be_answered_by(message, node)
+        if asked and self._state is WAITING and (fault := self._missized(message)) is not None:
+            self._damaged(fault, now)
+            return
         late = asked or (earlier is not None and earlier.may_be_answered_by(message, node))
         if asked and self._state is WAITING:
             self._attempts.wrong.append((message.NAME, self.codec.encode(message)))
         count.strays += 1
         count.late += late
         self.events.append(Stray(now, message, late))
+
+    def _missized(self, message: Framed) -> Fault | None:
+        """The fault of a response of another size than the request asks for, None if it has that size."""
+        command, request = self._pending.command.definition, self._pending.request
+        if type(message) is not command.response or not (name := wrong_size(command, request, message)):
+            return None
+        asked = next(number for field, number, _ in command.sizes if field == name)
+        text = (
+            f"{message.NAME}: {name} has {len(getattr(message, name))} items; "
+            f"{asked} of the request asks for {getattr(request, asked)}"
+        )
+        return NotAnAnswer("length", 0, self.codec.encode(message), text)
 
     def _damaged(self, fault: Fault, now: float) -> None:
         waiting = self._state is WAITING

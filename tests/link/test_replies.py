@@ -12,7 +12,7 @@ from qlinkgen.backends.python import load as load_codec
 from qlinkgen.cli.decode import message_record
 from qlinkgen.errors import BadReply, NoReply, Refused
 from qlinkgen.link import PENDING, HealthPolicy, MasterEngine, Monitor, Refusal, SlaveEngine, Timing
-from qlinkgen.link.events import Failed, OtherAnswer, Stray
+from qlinkgen.link.events import Damaged, Failed, OtherAnswer, Stray
 from qlinkgen.link.monitor import Replied, Unanswered
 from qlinkgen.schema import loads
 from qlinkgen.sim import VirtualPort, Wire
@@ -370,6 +370,10 @@ def test_a_row_of_other_bytes_is_no_answer(rows: ModuleType, number: int) -> Non
     sent = rows.ReadResponse(node=3, bits=[True] * number).to_frame()
     outcome = run(engine, rows.ReadRequest(node=3, many=ASKED), (0.012, sent), attempts=1)
     assert isinstance(outcome.error, BadReply)
+    assert "invalid replies (length)" in str(outcome.error)
+    [damaged] = [event for event in engine.events if isinstance(event, Damaged)]
+    assert damaged.fault.kind == "length"
+    assert "many of the request asks for 11" in damaged.fault.message
 
 
 def test_a_monitor_cuts_a_row_if_it_has_seen_the_request(rows: ModuleType) -> None:

@@ -564,3 +564,31 @@ def test_the_text_does_not_depend_on_the_hash_seed() -> None:
         seeded = {**environment, "PYTHONHASHSEED": seed}
         seen.add(subprocess.run(command, env=seeded, cwd=ROOT, capture_output=True, check=True).stdout)
     assert len(seen) == 1
+
+
+VALUED = """\
+qlinkgen: 1
+protocol: {name: valued, title: Valued, revision: "1", source: Manual}
+frame:
+  parts:
+    start: FE
+    length: {type: u8, counts: data}
+    number: {role: counter, type: u8, per: frame}
+    component: {type: u8, default: 1, range: 1..9}
+    code: {role: message, type: u8}
+    data: {role: payload, size: 0..32}
+    crc: {type: u16, algorithm: crc-16/modbus, over: [length, number, component, code, data]}
+bus: {kind: master_slave, response_within: 5 ms}
+defaults: {repeat: safe}
+commands:
+  read: {id: 1, request: {start: u8}, response: {value: u16}}
+"""
+
+
+def test_calls_take_the_values_of_every_frame_but_not_the_counter() -> None:
+    protocol, faults = loads(VALUED, "valued.yaml")
+    assert protocol is not None, faults
+    text = "".join(bus.generate(protocol, Options()).values())
+    assert "def read(self, *, start: int = 0, component: int = 1) -> ReadResponse:" in text
+    assert "component: 1..9." in text
+    assert "component=component" in text

@@ -193,7 +193,7 @@ class BusModule:
 
     def _taken(self, transaction: Transaction) -> list[str]:
         """Parameters for the values of a request."""
-        settable = transaction.request.payload.settable
+        settable = self._settable(transaction)
         for each in settable:
             if isinstance(each, RecordStep | RecordsStep):
                 self._classes.add(self._place.classes[each.record.name])
@@ -207,7 +207,7 @@ class BusModule:
 
     def _further(self, transaction: Transaction) -> list[tuple[str, MessagePlan]]:
         """Parameters for what the master sends after a request."""
-        names = {held(each) for each in transaction.request.payload.settable}
+        names = {held(each) for each in self._settable(transaction)}
         names |= {self._place.address}
         found = []
         for message in transaction.further:
@@ -218,10 +218,16 @@ class BusModule:
             found.append((name, message))
         return found
 
-    @staticmethod
-    def _given(transaction: Transaction) -> list[str]:
+    def _settable(self, transaction: Transaction) -> list[Holder]:
+        """What a caller gives: the values of a request, and those of its frame without the counter."""
+        counter = self._protocol.counter
+        beside = (member for _, member in transaction.request.envelope.values)
+        others = [each for each in beside if counter is None or each.name != counter.name]
+        return [*transaction.request.payload.settable, *others]
+
+    def _given(self, transaction: Transaction) -> list[str]:
         """Arguments that pass the parameters on."""
-        names = dict.fromkeys(held(each) for each in transaction.request.payload.settable)
+        names = dict.fromkeys(held(each) for each in self._settable(transaction))
         return [f"{name}={name}" for name in names]
 
     def _answer(self, transaction: Transaction, more: Sequence[MessagePlan], *, surely: bool = False) -> str:
@@ -309,8 +315,11 @@ class BusModule:
         """The section on arguments; ``first`` describes the one that is not a field."""
         entries = [first] if first else []
         pairs: dict[str, list[tuple[Value, Holder]]] = {}
-        settable = call.request.payload.settable
-        for value, each in zip(call.request.message.values, settable, strict=True):
+        stated = {value.name: value for value in self._protocol.frame_values}
+        settable = self._settable(call)
+        own = call.request.message.values
+        all_stated = [*own, *(stated[each.name] for each in settable[len(own) :])]
+        for value, each in zip(all_stated, settable, strict=True):
             pairs.setdefault(attribute(value.name), []).append((value, each))
         entries += [f"{name}: {values.description(cases, self._place)}" for name, cases in pairs.items()]
         entries += [
