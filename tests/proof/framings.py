@@ -1,20 +1,28 @@
 """Frames of many framings recovered from corrupted streams, by generated stream decoders.
 
-`python -m tests.proof.framings` prints the table of docs/recovery.md.
+`python -m tests.proof.framings` prints the tables of docs/recovery.md, `--write` writes them.
 """
 
 from __future__ import annotations
 
 import functools
 import random
+import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 
 from qlinkgen.backends import python
-from qlinkgen.schema import loads
+from qlinkgen.model.message import Message
+from qlinkgen.plan import Plan, plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.schema import find, library, load, loads
 from tests.proof.corruption import EVERY_KIND
 from tests.proof.recovery import Result, Subject
+from tests.support.random_raw import random_address, random_beside, random_values
 
 FRAMES = 600
+PAGE = Path(__file__).parents[2] / "docs" / "recovery.md"
 
 _SCHEMA = """
 qlinkgen: 1
@@ -63,6 +71,8 @@ _FRAMINGS: Mapping[str, tuple[Sequence[str], str]] = {
 }
 #: Those whose receivers deliver every intact frame.
 CHECKED = [name for name in _FRAMINGS if "without" not in name]
+#: The protocols of the library.
+LIBRARY = library()
 
 
 @functools.cache
@@ -87,9 +97,35 @@ def subject(name: str) -> Subject:
     return Subject(frames, lambda each: frames[0][: each.randint(1, 4)], decoded)
 
 
+@functools.cache
+def library_subject(name: str) -> Subject:
+    """Distinct frames of a protocol of the library, in the direction that most messages have."""
+    protocol = load(find(name))
+    plan, module, chance = plan_of(protocol), python.load(protocol), random.Random(name)
+    direction = max(plan.received_directions, key=lambda each: len(plan.received(each)))
+    messages = [protocol.by_name[each.name] for each in plan.received(direction)]
+    frames = list(dict.fromkeys(_random(plan, chance.choice(messages), chance) for _ in range(FRAMES)))
+    arguments = () if direction == "message" else (direction,)
+
+    def decoded(chunks: Iterable[bytes]) -> Sequence[bytes]:
+        decoder = module.StreamDecoder(*arguments)
+        events = [event for chunk in chunks for event in decoder.feed(chunk)] + decoder.finish()
+        return [event.to_frame() for event in events if not isinstance(event, module.Fault)]
+
+    return Subject(frames, lambda each: frames[0][: each.randint(1, 4)], decoded)
+
+
+def _random(plan: Plan, message: Message, chance: random.Random) -> bytes:
+    """A frame of random values."""
+    values = dict(zip((each.name for each in message.values), random_values(message, chance), strict=True))
+    values |= random_beside(plan.protocol, message, chance)
+    return Codec(plan).encode(message.name, values, random_address(message, chance))
+
+
 def total(name: str) -> Result:
     """The sum of the results for every kind of corruption."""
-    results = [subject(name).result(kind) for kind in EVERY_KIND]
+    found = library_subject(name) if name in LIBRARY else subject(name)
+    results = [found.result(kind) for kind in EVERY_KIND]
     return Result(
         *(sum(getattr(each, key) for each in results) for key in ("intact", "recovered", "strange"))
     )
@@ -107,5 +143,23 @@ def table() -> str:
     return "\n".join(["| framing | delivered | not sent |", "|---|---|---|", *map(row, _FRAMINGS)])
 
 
+def library_table() -> str:
+    """The same of every protocol of the library."""
+    return "\n".join(["| protocol | delivered | not sent |", "|---|---|---|", *map(row, LIBRARY)])
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print or write the tables."""
+    tables = (table(), library_table())
+    print("\n\n".join(tables))
+    if "--write" in arguments:
+        page = PAGE.read_text("utf-8")
+        for each in tables:
+            head = re.escape(each.partition("\n")[0])
+            begin, standing, end = re.split(rf"^({head}\n(?:\|.*\n)*)", page, flags=re.MULTILINE)
+            page = f"{begin}{each}\n{end}" if standing else page
+        PAGE.write_text(page, "utf-8")
+
+
 if __name__ == "__main__":
-    print(table())
+    main(sys.argv[1:])
