@@ -230,6 +230,3 @@ class StepBuilder:
             what = f"the response of {asked.name} is not its last answer"
             hint = "let the last step that receives be {receive: response}, or remove the response"
             self._report.error(_RULE, asked.path, what, hint, of_key=True, needs=(asked.path,))
-        elif any(message is asked.response for message in received[:-1]):
-            what = f"the response of {asked.name} is received twice"
-            self._report.error(_RULE, asked.path, what, "write the fields of the other one", of_key=True)

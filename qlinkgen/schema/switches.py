@@ -84,6 +84,10 @@ class _Rewriter:
                     found[name] = self.rewritten(each, (*path, name))
             same = found.keys() == node.keys() and all(found[name] is node[name] for name in found)
             return node if same else found  # type: ignore[return-value]  # fields of the model are dicts
+        if isinstance(node, list):
+            items = [self.rewritten(each, (*path, index)) for index, each in enumerate(node)]
+            same = all(one is other for one, other in zip(items, node, strict=True))
+            return node if same else items  # type: ignore[return-value]  # fields of the model are lists
         return node
 
     def _fields(

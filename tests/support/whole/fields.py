@@ -860,7 +860,8 @@ class FieldMaker:
         room.left -= most + 1
 
     def _is_open(self, spec: Any, made: list[tuple[str, Any]]) -> bool:
-        names = {each["counts"] for _, each in made if isinstance(each, dict) and "counts" in each}
+        counts = [each["counts"] for _, each in made if isinstance(each, dict) and "counts" in each]
+        names = {name for each in counts for name in ([each] if isinstance(each, str) else each)}
         kind = str(spec["type"] if isinstance(spec, dict) else spec)
         kind = kind.replace("[]", "[..]")
         if isinstance(spec, dict) and "terminator" in spec:

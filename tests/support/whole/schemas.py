@@ -264,7 +264,7 @@ class _Maker:
             if key == "receive" and sent and rng.random() < 0.3:
                 steps.append({key: rng.choice(sent)})
                 continue
-            step = self._step(shape, maker, command["id"], key, used)
+            step = self._step(shape, maker, command, key, used)
             if step is not None and rng.random() < 0.5:
                 step = {"name": self.words.name(taken), **step}
             steps += [self._described(step)] if step is not None else []
@@ -281,16 +281,17 @@ class _Maker:
         return addressed and one and command["response"] != "none"
 
     def _step(
-        self, shape: Shape, maker: FieldMaker, asked: Any, key: str, used: set[tuple[str, int]]
+        self, shape: Shape, maker: FieldMaker, command: Doc, key: str, used: set[tuple[str, int]]
     ) -> Doc | None:
         """A frame with an id of its own, None if none is free."""
         rng = self.rng
         direction = "request" if key == "send" else "response"
-        numbers = [shape.number(asked)]
+        numbers = [shape.number(command["id"])]
         number = self._answer_id(shape, numbers, used, relative=rng.random() < 0.3, direction=direction)
         if number is None:
             return None
-        step: Doc = {key: {"id": number, "fields": maker.fields(Room.of(shape))}}
+        make = maker.texts if "separator" in command else maker.fields
+        step: Doc = {key: {"id": number, "fields": make(Room.of(shape))}}
         return step | ({"within": rng.choice(("20 ms", "5 bytes"))} if rng.random() < 0.3 else {})
 
     def _last(self, command: Doc, steps: list[Doc]) -> None:

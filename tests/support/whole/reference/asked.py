@@ -32,7 +32,8 @@ class Asked:
 def asked(document: Doc, fields: Fields, messages: Sequence[Message]) -> Asked | None:
     """The answers with the number that the defaults state, or in a frame without numbers."""
     free = set(document.get("messages", {}))
-    answers = [each for each in messages if each.direction == "response" and each.name not in free]
+    free |= {name for name, spec in document["commands"].items() if "steps" in spec}
+    answers = [m for m in messages if m.direction == "response" and m.name.partition(".")[0] not in free]
     parts = document["frame"].get("parts", {})
     if not parts:
         return None

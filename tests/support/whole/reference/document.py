@@ -792,7 +792,8 @@ def _with_separator(message: Message, document: Doc) -> Message:
     places = [document.get("messages", {}).get(name), document.get("commands", {}).get(name)]
     if reply not in ("", "request", "response"):
         own = document["commands"][name].get("replies", {})
-        places = [own.get(reply) or document["replies"][reply]]
+        found = own.get(reply) or document.get("replies", {}).get(reply)
+        places = [found or document["commands"][name]]  # a step has the separator of its command
     elif not any(places):
         places = [document["replies"][name]]
     spec = next(each for each in places if each)
