@@ -56,12 +56,12 @@ def kind_of(protocol: Protocol) -> Kind:
             return HOST
         case "ring", Marks():
             return RING
-        case "master_slave", Hunt() | Rescan() | Marks():
+        case "master_slave" | "link", Hunt() | Rescan() | Marks():
             return BUS
     raise Failure(
         f"{protocol.name}: frames of this kind on a bus of kind {protocol.bus.kind} can be encoded and "
-        "decoded, but not driven; supported are frames of parts with master_slave, marked with ring, packet "
-        "with host"
+        "decoded, but not driven; supported are frames of parts with master_slave or link, marked with ring, "
+        "packet with host"
     )
 
 

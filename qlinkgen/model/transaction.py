@@ -18,7 +18,7 @@ Addressing = Literal["node", "broadcast", "either", "answered_broadcast", "none"
 #: "refused": the slave does not do it; "again": it asks for the request once more; "pending": the answer
 #: follows later; "done": an answer like the response, of another form.
 Means = Literal["refused", "again", "pending", "done"]
-BusKind = Literal["master_slave", "ring", "host"]
+BusKind = Literal["master_slave", "link", "ring", "host"]
 
 
 @dataclass(frozen=True, slots=True)

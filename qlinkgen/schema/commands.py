@@ -27,9 +27,14 @@ from qlinkgen.schema.source import Path
 from qlinkgen.schema.steps import Asked, StepBuilder, names_response
 
 
-def build_bus(file: SchemaFile) -> Bus:
+def build_bus(file: SchemaFile, report: Reporter) -> Bus:
     """The bus described by the file."""
     spec = file.bus
+    if spec.sides is not None and (spec.kind != "link" or len(set(spec.sides)) < len(spec.sides)):
+        what, hint = "only a link has sides", "use kind: link, or remove them"
+        if spec.kind == "link":
+            what, hint = "both sides of the link have the same name", "use different names"
+        report.error("bad-link", ("bus", "sides"), what, hint, of_key=True)
     return Bus(
         kind=spec.kind,
         nodes=spec.nodes,

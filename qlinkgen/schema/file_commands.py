@@ -346,6 +346,7 @@ class MessageSpec(Fact, Lifetime):
     direction: Literal["request", "response"] | None = Field(
         default=None, description="Direction of the message; default: any node sends it"
     )
+    side: Name | None = Field(default=None, alias="from", description="The side of a link that sends it")
     means: Annotated[MeansSpec, ShortForm("default", "string")] | None = Field(
         default=None, description="What it means as a response, if one of its fields may refuse the request"
     )

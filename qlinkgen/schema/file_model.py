@@ -31,7 +31,13 @@ class ProtocolSpec(FileMapping):
 class BusSpec(FileMapping):
     """The line and its nodes."""
 
-    kind: Literal["master_slave", "ring", "host"] = Field(description="Topology of the bus")
+    kind: Literal["master_slave", "link", "ring", "host"] = Field(description="Topology of the bus")
+    sides: list[Name] | None = Field(
+        default=None,
+        min_length=2,
+        max_length=2,
+        description="The two ends of a link: the one that sends requests, and the other",
+    )
     section: Text = Field(default="", description="Section of the source document that states it")
     nodes: WholeRange | None = Field(default=None, description="First..last address")
     broadcast: Id | None = Field(default=None, description="Address of all nodes at once")

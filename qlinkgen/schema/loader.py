@@ -150,7 +150,7 @@ def _build(
     payload_max = payload_bounds(file)[1]
     types = TypeBuilder(file, report, payload_max)
     frame = FrameBuilder(file, report, types, crc).build()
-    bus = build_bus(file)
+    bus = build_bus(file, report)
     check_types(file, report)
     check_references(file, report, frame)
     check_addresses(frame, bus, report)

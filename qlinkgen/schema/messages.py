@@ -16,9 +16,9 @@ from qlinkgen.schema.file_base import Fact
 from qlinkgen.schema.file_commands import CommandSpec, MessageSpec
 from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.file_model import SchemaFile
-from qlinkgen.schema.notation import StatedId
+from qlinkgen.schema.notation import StatedId, shown
 from qlinkgen.schema.pieces import IdBuilder
-from qlinkgen.schema.report import Reporter
+from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.seeds import SeedBuilder
 from qlinkgen.schema.separated import check_separator, separated
 from qlinkgen.schema.source import Path
@@ -188,11 +188,12 @@ class MessageBuilder:
             name, StatedId(spec.id), ("messages", name, "id"), spec.fields, path, (), spec.separator
         )
         nodes = self._bus.nodes if self.addressed else None
-        number = self._number(layout, spec.direction or "message", name)
+        direction = self._sent(name, spec)
+        number = self._number(layout, direction, name)
         message = Message(
             name=name,
             command=name,
-            direction=spec.direction or "message",
+            direction=direction,
             id=number,
             fields=self._fields_of(layout),
             doc=spec.doc,
@@ -205,7 +206,7 @@ class MessageBuilder:
             separator=self._separator(layout),
         )
         self._add(message, layout)
-        if isinstance(self._frame, PacketFrame) and spec.direction != "request":
+        if isinstance(self._frame, PacketFrame) and direction != "request":
             what = f"{name} is not the response to a request"
             hint = "add direction: request, or make it a command"
             self._report.error("bad-packet", ("messages", name), what, hint, of_key=True, absent=True)
@@ -218,6 +219,24 @@ class MessageBuilder:
         message = self.asked.carrier(answers, path)
         self.places[message.name] = self.id_places[message.name] = path
         return message
+
+    def _sent(self, name: str, spec: MessageSpec) -> Direction:
+        """The direction of a message outside of commands: stated, or by the side of a link that sends it."""
+        place: Path = ("messages", name, "from")
+        if spec.side is None:
+            return spec.direction or "message"
+        sides, needs = self._file.bus.sides or [], (place, ("bus",))
+        if spec.direction is not None:
+            what = f"{name} has a side and a direction"
+            self._report.error("bad-link", place, what, "remove one of them", of_key=True, needs=needs)
+        elif not sides:
+            what = f"{name} is from a side, but the bus has none"
+            hint = "write bus: {kind: link, sides: [host, device]}"
+            self._report.error("bad-link", place, what, hint, of_key=True, needs=needs)
+        elif spec.side not in sides:
+            what, hint = f"the bus has no side {shown(spec.side)}", f"its sides are {listed(sides)}"
+            self._report.error("bad-link", place, what, did_you_mean(spec.side, sides, hint), needs=needs)
+        return "response" if spec.side in sides[1:] else "request"
 
     def _addresses(
         self, addressing: Addressing, direction: Direction

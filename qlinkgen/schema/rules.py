@@ -153,6 +153,12 @@ _ALL = (
         "present, or absent wherever it is present. A count has the condition of the field that it counts.",
     ),
     Rule(
+        "bad-link",
+        "Only a link has sides, which are two, and messages come from one of them.",
+        "Neither side of a link is its master: each sends messages. The first of its `sides` also sends the "
+        "requests of commands, and the other one answers.",
+    ),
+    Rule(
         "part-direction",
         "A part with `if` is in all frames of one direction, and in none of the other.",
         "Only the direction decides, and one receiver finds the frames of both: they begin alike and have "

@@ -115,7 +115,11 @@ class StepBuilder:
         faults = {
             "many": (spec.many is not None, "it has several answers", "write each as a step, or remove many"),
             "addressing": (several, "it may be broadcast", "use addressing: node"),
-            "bus": (self._file.bus.kind != "master_slave", "its bus has no master", "use kind: master_slave"),
+            "bus": (
+                self._file.bus.kind in ("ring", "host"),
+                "its bus has no master",
+                "use kind: master_slave",
+            ),
             "frame": (
                 self._file.frame.parts is None,
                 "its frame has no parts",

@@ -573,7 +573,7 @@ class Bus:
     """The line and its nodes, according to the schema.
 
     Attributes:
-        kind: master_slave, ring or host.
+        kind: master_slave, link, ring or host.
         first_node: lowest address of a node, None if frames have no address.
         last_node: highest address of a node, None if frames have no address.
         broadcast: address of all nodes at once, None if there is none.

@@ -17,6 +17,8 @@ _PLAIN = re.compile(r"[a-z][a-z0-9_]*\Z", re.ASCII)
 _YAML_WORDS = frozenset("true false null yes no on off y n nan inf".split())  # noqa: SIM905
 #: One in this number of schemas has mostly fields of variable size.
 _VARIABLE = 5
+#: One in this number of schemas with a master has a link instead.
+_LINK = 9
 _MEANS = ("refused", "again", "pending", "done")
 #: Mappings below this depth are written on one line.
 _BLOCKS = 4
@@ -93,6 +95,8 @@ class _Maker:
         document["frame"] = shape.frame
         document["bus"] = self._bus(shape)
         document |= self._traffic(shape, maker, document["bus"])
+        if shape.bus == "master_slave" and self.seed % _LINK == 1:
+            _link(document)
         maker.forget_unused(document)
         return document
 
@@ -463,6 +467,14 @@ class _Maker:
             if number not in self._ids and number != shape.end_id:
                 self._ids.add(number)
                 return number
+
+
+def _link(document: Doc) -> None:
+    """Let the bus be a link, whose sides the directed messages name."""
+    document["bus"] |= {"kind": "link", "sides": ["host", "device"]}
+    for spec in document.get("messages", {}).values():
+        if "direction" in spec:
+            spec["from"] = {"request": "host", "response": "device"}[spec.pop("direction")]
 
 
 # YAML

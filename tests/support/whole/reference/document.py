@@ -827,11 +827,12 @@ def _messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, 
         found += _replies(name, merged, document, fields, {each.name for each in found}, addressed=addressed)
     nodes = _nodes(document) if addressed else None
     for name, spec in document.get("messages", {}).items():
+        direction = _sent(document, spec)
         found.append(
             Message(
                 name,
-                numbered(document, spec.get("id"), spec.get("direction", "message")),
-                spec.get("direction", "message"),
+                numbered(document, spec.get("id"), direction),
+                direction,
                 fields.build(spec["fields"]),
                 (nodes,) if nodes else (),
                 nodes[0] if nodes else 0,
@@ -839,6 +840,14 @@ def _messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, 
             )
         )
     return tuple(found)
+
+
+def _sent(document: Doc, spec: Doc) -> Direction:
+    """The direction of a message outside of commands."""
+    direction: Direction = spec.get("direction", "message")
+    if "from" in spec:
+        direction = "response" if document["bus"]["sides"].index(spec["from"]) else "request"
+    return direction
 
 
 def _of_command(name: str, spec: Doc, document: Doc, fields: Fields, addressed: bool) -> Iterator[Message]:
