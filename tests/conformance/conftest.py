@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conformance import kits
+from tests.conformance import emulators, kits
 from tests.support.sharing import made_once
 
 Write = Callable[[str], Path]
@@ -25,3 +25,9 @@ def kit(shared: Path) -> Write:
         return folder / f"{name}_conformance.c"
 
     return get
+
+
+@pytest.fixture(scope="session")
+def simulator(tmp_path_factory: pytest.TempPathFactory, require_tool: Callable[..., str]) -> Path:
+    """Give the program that runs a firmware of an ATmega328P to its end."""
+    return emulators.avr_simulator(tmp_path_factory.mktemp("simavr"), require_tool)

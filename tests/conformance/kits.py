@@ -11,6 +11,7 @@ from pathlib import Path
 
 from qlinkgen.backends.base import Options
 from qlinkgen.cli.targets import TARGETS
+from qlinkgen.model.protocol import Protocol
 from tests.proof.cases import protocol
 from tests.support.cdriver import WARNINGS
 
@@ -19,11 +20,11 @@ STDIO = "-DCONFORMANCE_STDIO=1"
 _LINE = re.compile(r"(?P<result>ok|not ok) (?P<number>[0-9]+) - (?P<name>.+)")
 
 
-def write(name: str, folder: Path, options: Options | None = None) -> Path:
-    """Write header and kit of a protocol side by side; returns the kit."""
+def write(name: str, folder: Path, options: Options | None = None, model: Protocol | None = None) -> Path:
+    """Write header and kit of a protocol, by default of its name, side by side; returns the kit."""
     for target in ("c", "conformance"):
         generate = TARGETS[target].load()
-        for path, text in generate(protocol(name), options or Options()).items():
+        for path, text in generate(model or protocol(name), options or Options()).items():
             (folder / Path(path).name).write_text(text, "utf-8")
     return folder / f"{name}_conformance.c"
 

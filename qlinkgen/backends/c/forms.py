@@ -136,7 +136,7 @@ def row_helpers(prefix: str, rows: Collection[tuple[str, int, BitOrder]]) -> lis
                 "{",
                 f"    {kind} value = 0U;",
                 "    for (size_t bit = 0U; bit < bits; ++bit, ++at) {",
-                f"        const {kind} one = ({kind})((from[at / 8U] >> ({place})) & 1U);",
+                f"        const {kind} one = ({kind})(((unsigned int)from[at / 8U] >> ({place})) & 1U);",
                 f"        value = ({kind})(value | ({kind})(one << ({index})));",
                 "    }",
                 "    return value;",
