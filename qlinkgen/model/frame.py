@@ -41,6 +41,8 @@ class Checksum:
     otherwise: int | None = None
     #: Size of the blocks of the covered part that have a value each, 0 for one value over all parts.
     every: int = 0
+    #: Each chunk of four bits is sent as a hexadecimal digit.
+    digits: bool = False
 
     @property
     def mask(self) -> int:
@@ -59,7 +61,12 @@ class Checksum:
 
     def pack(self, value: int) -> bytes:
         """The wire bytes of a check value; bits that are not sent are dropped."""
-        return pack_chunks(value, self.chunks)
+        data = pack_chunks(value, self.chunks)
+        return bytes(b"0123456789ABCDEF"[each] for each in data) if self.digits else data
+
+    def normal(self, data: bytes) -> bytes:
+        """Received bytes as they are sent: digits in upper case."""
+        return data.upper() if self.digits else data
 
 
 @dataclass(frozen=True, slots=True)

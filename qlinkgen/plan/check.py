@@ -76,4 +76,10 @@ class Check:
 
     def unpack(self, data: bytes) -> int:
         """The value of wire bytes; bits that are not sent are 0."""
+        if self.value.digits:
+            return int(data, 16) if data.isalnum() and not data.upper().strip(b"0123456789ABCDEF") else 0
         return unpack_chunks(data, self.value.chunks)
+
+    def normal(self, data: bytes) -> bytes:
+        """Received bytes as they are sent: digits in upper case."""
+        return self.value.normal(data)

@@ -257,7 +257,9 @@ class Codec:
         cells: Mapping[str, bytes],
         request: bytes = b"",
     ) -> None:
-        if taken.cells[part.name] != part.check.pack(self.check_value(part, envelope, cells, request)):
+        if part.check.normal(taken.cells[part.name]) != part.check.pack(
+            self.check_value(part, envelope, cells, request)
+        ):
             refusal = part.check.rejected is not None and part.check.pack(part.check.rejected)
             raise BadFrame("illegal" if taken.cells[part.name] == refusal else "crc", taken.end)
 

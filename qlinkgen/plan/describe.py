@@ -405,7 +405,8 @@ def check_text(check: Check, frame: FramePlan) -> str:
     if check.chained:
         words = f"every {check.word}-byte word" if check.word > 1 else "every byte"
         return f"{check.algorithm.name} of {frame.id_name} and {words}, written or read"
-    return f"{check.algorithm.name} over {', '.join(check.over)}"
+    digits = f", as {check.size} digits" if check.value.digits else ""
+    return f"{check.algorithm.name} over {', '.join(check.over)}{digits}"
 
 
 def _sent_bits_text(check: Check) -> str:

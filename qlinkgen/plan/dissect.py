@@ -492,6 +492,7 @@ class _Walk:
         cells |= dict(self.message.message.seeds) if self.message else {}
         right = check.pack(self.codec.check_value(part, self.envelope, cells, self.request))
         received, expected = check.unpack(data), check.unpack(right)
+        data = check.normal(data)
         if data != right and self._displaced(part):
             self._span(part, received)
             return

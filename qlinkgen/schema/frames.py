@@ -336,7 +336,7 @@ class FrameBuilder:
             return None
         self._parts.reject(
             spec.checksum,
-            ("value", "text", "counts", "size", "trim", "words", "rejected", "every", "otherwise"),
+            ("value", "text", "counts", "size", "trim", "words", "rejected", "every", "otherwise", "as"),
             "checksum",
             place,
         )
@@ -415,7 +415,20 @@ class FrameBuilder:
     def _packet_checksum(self, spec: PartSpec, specs: Mapping[str, PartSpec], place: Path) -> Checksum | None:
         self._parts.reject(
             spec,
-            ("value", "text", "counts", "size", "trim", "sent", "only", "over", "init", "every", "otherwise"),
+            (
+                "value",
+                "text",
+                "counts",
+                "size",
+                "trim",
+                "sent",
+                "only",
+                "over",
+                "init",
+                "every",
+                "otherwise",
+                "as",
+            ),
             "packet's checksum",
             place,
         )

@@ -34,7 +34,7 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "message": ("type", "byteorder"),
     "address": ("type", "byteorder"),
     "payload": ("size", "trim"),
-    "checksum": ("type", "byteorder", "algorithm", "init", "over", "every", "otherwise", "sent"),
+    "checksum": ("type", "byteorder", "algorithm", "init", "over", "every", "otherwise", "sent", "as"),
     "terminator": ("value", "text", "shared"),
     "idle": ("time", "at_least"),
 }
@@ -61,6 +61,7 @@ _KEYS = (
     "every",
     "otherwise",
     "sent",
+    "as",
     "only",
     "words",
     "rejected",
@@ -203,7 +204,7 @@ class PartBuilder:
     def reject(self, spec: PartSpec, keys: Iterable[str], role: str, path: Path) -> None:
         """Report keys that do not apply to a part with this role."""
         for key in keys:
-            if key in spec.model_fields_set:
+            if {"as": "as_"}.get(key, key) in spec.model_fields_set:
                 self.fault(
                     "not-applicable", (*path, key), f"'{key}' has no effect on a {role} here", "remove it"
                 )
@@ -327,6 +328,7 @@ class PartBuilder:
             spec.confirmed,
             self._otherwise(spec, algorithm, path),
             spec.every or 0,
+            digits=spec.as_ is not None,
         )
 
     def _otherwise(self, spec: PartSpec, algorithm: catalogue.Checksum, path: Path) -> int | None:
@@ -350,6 +352,8 @@ class PartBuilder:
             return algorithm
 
     def _sent(self, spec: PartSpec, scalar: Scalar, path: Path) -> tuple[Chunk, ...]:
+        if spec.as_ is not None:
+            return self._as_digits(spec, scalar, path)
         if not spec.sent:
             return scalar.chunks
         taken = 0
@@ -368,6 +372,15 @@ class PartBuilder:
                 self._report.error("checksum-does-not-fit", place, what, "name each bit once", needs=(path,))
             taken |= mask
         return tuple(Chunk(first, last + 1 - first) for first, last in spec.sent)
+
+    def _as_digits(self, spec: PartSpec, scalar: Scalar, path: Path) -> tuple[Chunk, ...]:
+        """The hexadecimal digits of a checksum."""
+        self.reject(spec, ("byteorder", "sent", "every"), "digits", path)
+        right = f"hex[{scalar.bits // 4}]"
+        if (spec.as_ or "").replace(" ", "") != right:
+            what = f"a checksum of {scalar.bits} bits is not {shown(spec.as_)}"
+            self._report.error("bad-digits", (*path, "as"), what, f"write as: {right}", needs=(path,))
+        return tuple(Chunk(shift, 4) for shift in range(scalar.bits - 4, -1, -4))
 
     def _ambiguous(self, name: str, found: catalogue.Checksum | None, path: Path) -> bool:
         """Report an ambiguous name; ``found`` is what it was taken as."""

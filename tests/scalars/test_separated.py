@@ -167,3 +167,33 @@ def test_a_text_without_a_bound_takes_what_the_others_leave() -> None:
     message = protocol.by_name["put"]
     assert message.max_size == 80
     assert message.fields[1].max_size == 80 - 3 - 2 - 2
+
+
+_CHECKED = _SCHEMA.replace(
+    "end: {{role: terminator, value: 0D 0A}}",
+    """star: {{role: terminator, text: "*"}}
+    check: {{type: u8, as: "hex[2]", algorithm: xor8, over: [code, comma, data]}}
+    end: 0D 0A""",
+)
+
+
+def test_check_value_as_digits() -> None:
+    text = _CHECKED.format(fields='      name: "text[0..8]"', more="doc: D.")
+    protocol, faults = loads(text, "probe.yaml")
+    assert protocol, [str(fault) for fault in faults]
+    codec, live = python.load(protocol), construct.live(protocol)
+    frame = codec.Put(name="ab").to_frame()
+    right = 0
+    for byte in b"PUT,ab":
+        right ^= byte
+    assert frame == b"$PUT,ab*%02X\r\n" % right == live.wrap("put", live.payload("put", {"name": "ab"}))
+    made = [codec.Put(name=each) for each in "abcdefghijk"]
+    letters = next(each for each in made if each.to_frame()[-4:-2].lower() != each.to_frame()[-4:-2])
+    lower = letters.to_frame()[:-4] + letters.to_frame()[-4:-2].lower() + b"\r\n"
+    assert codec.decode(lower).name == letters.name
+    for wrong in (b"$PUT,ab*%02X\r\n" % (right ^ 1), b"$PUT,ab*G0\r\n"):
+        with pytest.raises(codec.DecodeError) as caught:
+            codec.decode(wrong)
+        assert caught.value.kind == "crc"
+    (header,) = c.generate(protocol, Options()).values()
+    assert "0x37U : 0x30U" in header

@@ -211,6 +211,8 @@ class CheckWriter(Places):
 
 def put_check(check: Check, place: str, at: int, value: str) -> list[str]:
     """Statements that write a check value."""
+    if check.value.digits:
+        return [f"{place}[{at + index}] = {digit};" for index, digit in enumerate(_digits(check, value))]
     return [
         f"{place}[{at + index}] = (uint8_t)({_piece(value, chunk.shift, chunk.mask)});"
         for index, chunk in enumerate(check.value.chunks)
@@ -218,11 +220,20 @@ def put_check(check: Check, place: str, at: int, value: str) -> list[str]:
 
 
 def differs(check: Check, place: str, at: int, value: str) -> str:
-    """The condition for received check bytes that differ from ``value``."""
+    """The condition for received check bytes that differ from ``value``; digits may have either case."""
+    if check.value.digits:
+        found = [(f"{place}[{at + index}]", digit) for index, digit in enumerate(_digits(check, value))]
+        return any_of(f"({seen} != {digit}) && ({seen} != ({digit} | 0x20U))" for seen, digit in found)
     return any_of(
         f"{place}[{at + index}] != (uint8_t)({_piece(value, chunk.shift, chunk.mask)})"
         for index, chunk in enumerate(check.value.chunks)
     )
+
+
+def _digits(check: Check, value: str) -> list[str]:
+    """The hexadecimal digits of a value as characters."""
+    pieces = [f"({_piece(value, chunk.shift, chunk.mask)})" for chunk in check.value.chunks]
+    return [f"(uint8_t)({each} + (({each} > 9U) ? 0x37U : 0x30U))" for each in pieces]
 
 
 def _piece(value: str, shift: int, mask: int) -> str:

@@ -293,6 +293,13 @@ class Check(NamedTuple):
     word: int = 0
     rejected: int | None = None
     otherwise: int | None = None
+    #: It is sent as hexadecimal digits; those received may be in lower case.
+    digits: bool = False
+
+    def differs(self, cells: Mapping[str, bytes], expected: bytes) -> bool:
+        """Whether the received value is another one."""
+        sent = cells[self.name]
+        return (sent.upper() if self.digits else sent) != expected
 
     def packed(self, value: int) -> bytes:
         """The wire bytes of a check value."""
@@ -519,7 +526,7 @@ class Frame(Construct):
     @staticmethod
     def _compare(check: Check, cells: Mapping[str, bytes], request: bytes) -> None:
         sent, expected = cells[check.name], check.value(cells, request)
-        if sent != expected:
+        if check.differs(cells, expected):
             rejected = check.rejected
             refused = rejected is not None and sent == check.packed(rejected)
             kind = "illegal" if refused else "crc"
@@ -713,7 +720,7 @@ class DelimitedFrame(Frame):
         for check in self.checks:
             if {check.name, *check.over} <= cells.keys():
                 expected = check.value(cells, b"")
-                if cells[check.name] != expected:
+                if check.differs(cells, expected):
                     raise FrameError("crc", f"{check.name} is not {expected.hex()}")
 
     def _constant(self, source: _Wire, part: Constant) -> bytes:

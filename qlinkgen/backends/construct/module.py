@@ -282,7 +282,11 @@ def _mark(part: MarkPart) -> Call:
 
 def _check(part: CheckPart, envelope: Envelope, algorithms: Algorithms) -> Call:
     check = part.check
-    kind = Integer(8 * check.size, signed=False, chunks=check.value.chunks)
+    kind = integer(Integer(8 * check.size, signed=False, chunks=check.value.chunks))
+    digits: tuple[tuple[str, Node], ...] = ()
+    if check.value.digits:
+        limits = (("low", 0), ("high", check.mask))
+        kind, digits = Call("TextNumber", (16, check.size, check.size), limits), (("digits", True),)
     over = Sequence((envelope.payload.name,) if check.chained else check.over)
     word = (("word", check.word),) if check.chained else ()
     rejected = (("rejected", check.rejected),) if check.rejected is not None else ()
@@ -290,8 +294,8 @@ def _check(part: CheckPart, envelope: Envelope, algorithms: Algorithms) -> Call:
     mask = hexadecimal(check.mask, (check.algorithm.width + 3) // 4)
     return Call(
         "Check",
-        (part.name, Ref(algorithms[check.algorithm]), integer(kind), mask, over),
-        (*word, *rejected, *otherwise),
+        (part.name, Ref(algorithms[check.algorithm]), kind, mask, over),
+        (*word, *rejected, *otherwise, *digits),
     )
 
 

@@ -224,6 +224,7 @@ class PlacedCheck:
         early: it is verified before the payload.
         result: statement that computes the value of a whole frame with `message` and `checksum`.
         wrong: condition for another value in the frame.
+        case: the call that makes received digits upper case, "" if there are none.
     """
 
     name: str
@@ -238,6 +239,7 @@ class PlacedCheck:
     early: bool
     result: str
     wrong: str
+    case: str
 
 
 @dataclass(frozen=True)
@@ -504,6 +506,8 @@ def _parameters(algorithm: Algorithm) -> list[str]:
 
 def _check_bytes(check: Check, number: str = "crc") -> str:
     """Expression for the wire bytes of a check value."""
+    if check.value.digits:
+        return f'b"%0{check.size}X" % {number}'
     if check.regular:
         return f'{number}.to_bytes({check.size}, "{check.regular}")'
     groups = [integers.group_out(number, chunk) for chunk in check.value.chunks]
@@ -868,6 +872,7 @@ def _placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> P
     start, end = _edge(envelope, part), _edge(envelope, part, after=True)
     seeded, main = part in envelope.seeded, part is envelope.check
     checksum = "checksum" if main else f"_CHECKSUM{mark}"
+    case = ".upper()" if part.check.value.digits else ""
     if view.order and view.size <= 2 and part.check.otherwise is None:
         place = int(start or "0")
         sent = integers.joined("frame", range(place, place + view.size), view.order)
@@ -876,7 +881,7 @@ def _placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> P
     else:
         given = f"frame{', message' if seeded else ''}{', checksum' if main else ''}"
         result = f"right = _check{mark}({given})"
-        wrong = f"right != frame[{start}:{end}]"
+        wrong = f"right != frame[{start}:{end}]{case}"
     return PlacedCheck(
         name=part.name,
         view=view,
@@ -890,6 +895,7 @@ def _placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> P
         early=early and part in envelope.header_checks,
         result=result,
         wrong=wrong,
+        case=case,
     )
 
 

@@ -337,7 +337,11 @@ class _Parts:
         spec |= _order(rng) | self._start(width)
         if covered == [names["payload"]] and self._chance(0.5):
             spec["otherwise"] = rng.randrange(1 << width)
-        spec |= self._sent(width) if not whole else {}
+        if not whole and self._chance(0.15):
+            spec.pop("byteorder", None)
+            spec["as"] = f"hex[{width // 4}]"
+        elif not whole:
+            spec |= self._sent(width)
         if not whole and "otherwise" not in spec:
             self._seeded(spec)
         names["checksum"] = self._add("crc", spec)
@@ -391,7 +395,8 @@ class _Parts:
         covered = front if front and self._chance(0.5) else self._coverable(names)
         covered = [name for name in covered if rng.random() < 0.7] or covered[:1]
         spec: Doc = {"role": "checksum", "type": _WIDTHS[width], "algorithm": algorithm, "over": covered}
-        name = self._add("head", self._seeded(spec) | _order(rng) | self._start(width) | self._sent(width))
+        shape = {"as": f"hex[{width // 4}]"} if self._chance(0.15) else _order(rng) | self._sent(width)
+        name = self._add("head", self._seeded(spec) | self._start(width) | shape)
         least = 1 if "lead" in names else 0
         place = rng.randint(least, len(front) if self._chance(0.7) else len(others))
         if "blocks" in names and others[place : place + 1] == [names["blocks"]]:

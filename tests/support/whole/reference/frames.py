@@ -119,6 +119,8 @@ def part_of(name: str, spec: object, order: str, fields: Fields) -> Part:
     pieces = byte_pieces(bits_of_type(spec["type"]) // 8, order)
     if "sent" in spec:
         pieces = tuple((first, last + 1 - first) for first, last in map(whole_span, spec["sent"]))
+    if "as" in spec:
+        pieces = tuple((at, 4) for at in range(bits_of_type(spec["type"]) - 4, -1, -4))
     if "every" in spec:
         return Part(name, "blocks", 0, spec, pieces=pieces)
     bits = tuple((role, shift, size, inner) for _, role, shift, size, inner in bits_of(spec))
@@ -128,6 +130,18 @@ def part_of(name: str, spec: object, order: str, fields: Fields) -> Part:
     values = fields.beside(name, spec)[1] if "bits" in spec else ()
     role = "bits" if spec["role"] in ("constant", "direction", "message", "address") else spec["role"]
     return Part(name, role, len(pieces), spec, pieces=pieces, bits=bits, values=values)
+
+
+def _shown(check: Part, value: int) -> bytes:
+    """The bytes of a check value."""
+    if "as" in check.spec:
+        return f"{value:0{len(check.pieces)}x}".upper().encode()
+    return put(check.pieces, value)
+
+
+def _cases(check: Part, data: bytes) -> tuple[bytes, ...]:
+    """Received bytes, as they would be sent."""
+    return (data.upper(),) if "as" in check.spec else (data,)
 
 
 def _has(spec: object, direction: str) -> bool:
@@ -348,7 +362,7 @@ class Frame:
         cut |= self.seeds.get(number, {})
         for _ in self.checks:  # so often that those which cover others become right
             for check in self.checks:
-                cut[check.name] = put(check.pieces, self.check_value(check, cut))
+                cut[check.name] = _shown(check, self.check_value(check, cut))
         return self._stuffed(cut | self._blocked(payload))
 
     def _blocked(self, payload: bytes) -> dict[str, bytes]:
@@ -457,7 +471,9 @@ class Frame:
             if cut[self.blocks.name] != values:
                 return True
         checks = [each for each in self.checks if {each.name, *each.spec["over"]} <= cut.keys()]
-        return any(cut[each.name] != put(each.pieces, self.check_value(each, cut)) for each in checks)
+        return any(
+            _shown(each, self.check_value(each, cut)) not in _cases(each, cut[each.name]) for each in checks
+        )
 
     def bad_constant(self, cut: Mapping[str, bytes]) -> bool:
         """Whether a constant or a derived number is wrong."""
