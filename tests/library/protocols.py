@@ -41,6 +41,7 @@ PEERS: Mapping[str, tuple[str, str]] = {
     "modbus_ascii": ("pymodbus", "pymodbus"),
     "modbus_rtu": ("pymodbus", "pymodbus"),
     "msp": ("yamspy", "yamspy"),
+    "nmea_0183": ("pynmea2", "pynmea2"),
     "pelco_d": ("ptz_control_lib", "pyptzcontroller"),
     "ppp": ("yahdlc", "python4yahdlc"),
     "shdlc": ("sensirion_shdlc_driver", "sensirion-shdlc-driver"),

@@ -61,6 +61,9 @@ def _random(value: Value, rng: random.Random) -> Raw:
         case Array():
             return [_number(kind.item, rng) for _ in range(_size(kind.length, rng))]
         case Blob():
+            if kind.excluded:  # between separators
+                plain = [each for each in range(0x21, 0x7F) if each not in kind.excluded]
+                return bytes(rng.choice(plain) for _ in range(_size(kind.length, rng)))
             size = rng.randint(0, kind.length.maximum) if kind.pad else _size(kind.length, rng)
             data = bytes(
                 rng.choice((rng.randrange(256), 0xA5, 0x00, 0xFF, 0xFD)) & (0x7F if kind.text else 0xFF)

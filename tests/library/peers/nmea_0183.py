@@ -1,0 +1,99 @@
+"""NMEA 0183 by pynmea2, which joins and parses sentences, and reads their numbers."""
+
+from __future__ import annotations
+
+import functools
+import re
+from decimal import Decimal
+from typing import Any
+
+import pynmea2
+
+from qlinkgen.model.fields import Field
+from qlinkgen.model.message import Direction
+from qlinkgen.model.types import Blob
+from qlinkgen.schema import find, load
+from tests.library.protocols import Record
+
+UNKNOWN: frozenset[str] = frozenset()
+_TYPES = {
+    "position_fix": "GGA",
+    "position": "GLL",
+    "active_satellites": "GSA",
+    "satellites_in_view": "GSV",
+    "recommended": "RMC",
+    "course": "VTG",
+    "date": "ZDA",
+    "heading": "HDT",
+    "depth": "DPT",
+    "depth_below": "DBT",
+    "wind": "MWV",
+}
+_QUALITY = ("none", "gps", "differential", "pps", "rtk", "float_rtk", "estimated", "manual", "simulation")
+#: Minimum number of characters and digits after the point of numbers; of others 1 and 0.
+_SHAPES = (
+    (r"time", 9, 2),
+    (r"latitude", 9, 4),
+    (r"longitude", 10, 4),
+    (r"date", 6, 0),
+    (r"year", 4, 0),
+    (r"azimuth_.", 3, 0),
+    (r"satellites?(_\d+)?|number_.|elevation_.|strength_.|in_view|day|month|zone_.*", 2, 0),
+    (r".*altitude|separation|depth|offset|scale", 1, 1),
+    (r".dop|age|speed|.*course|knots|heading|variation|feet|metres|fathoms|angle", 1, 2),
+)
+#: What it reads as numbers that it cannot have: times and dates, which may be any digits here.
+_CLOCKS = ("time", "date")
+
+
+def _text(name: str, value: Any) -> str:
+    if value is None:
+        return ""
+    if name == "quality":
+        return str(_QUALITY.index(value) if value in _QUALITY else value)
+    if isinstance(value, str):
+        return value
+    shapes = (each for each in _SHAPES if re.fullmatch(each[0], name))
+    _, least, point = next(shapes, ("", 1, 0))
+    return format(round(Decimal(str(value)), point), f"0{least}.{point}f")
+
+
+@functools.cache
+def _fields(message: str) -> tuple[Field, ...]:
+    return load(find("nmea_0183")).by_name[message].fields
+
+
+def build(record: Record) -> bytes | None:
+    if record["talker_1"] == ord("P"):
+        return None
+    kind, fields = _TYPES[record["message"]], record["fields"]
+    stated = _fields(record["message"])
+    texts = [_text(each.name, fields[each.name]) for each in stated]
+    optional = [each.optional for each in stated]
+    while optional and optional[-1] and not texts[-1]:
+        texts.pop()
+        optional.pop()
+    talker = chr(record["talker_1"]) + chr(record["talker_2"])
+    sentence = getattr(pynmea2, kind)(talker, kind, texts)
+    return str(sentence.render(newline=True)).encode()
+
+
+def read(wire: bytes, direction: Direction) -> Record | None:
+    del direction
+    if wire[1:2] == b"P":  # it takes this for a sentence of a manufacturer
+        return None
+    parsed = pynmea2.parse(wire.decode(), check=True)
+    message = next(name for name, each in _TYPES.items() if each == parsed.sentence_type)
+    fields: dict[str, Any] = {}
+    for field, (_, attribute, *_) in zip(_fields(message), parsed.fields, strict=False):
+        if field.name in _CLOCKS:
+            continue
+        value = getattr(parsed, attribute)
+        if isinstance(field.type, Blob):
+            fields[field.name] = value or (None if field.optional else "")
+        elif field.name == "quality":
+            fields[field.name] = _QUALITY[value] if value < len(_QUALITY) else value
+        else:
+            fields[field.name] = None if value in ("", None) else float(value)
+    letters = {"talker_1": ord(parsed.talker[0]), "talker_2": ord(parsed.talker[1])}
+    return {"message": message, **letters, "fields": fields}
