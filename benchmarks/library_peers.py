@@ -313,7 +313,7 @@ def dynamixel() -> Pair:
         (module.WriteRequest, {"node": 4, "start": 116, "data": position}),
     ] * REPEATS
     received = [
-        (module.Status, {"node": node, "error": 0, "alert": False, "data": bytes(range(node, node + size))})
+        (module.Unasked, {"node": node, "error": 0, "alert": False, "data": bytes(range(node, node + size))})
         for node, size in enumerate((4, 0, 10, 2), 1)
     ] * REPEATS
     frames = encoder(received)()

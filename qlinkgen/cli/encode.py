@@ -127,6 +127,7 @@ def _record(protocol: Protocol, given: Mapping[str, Json]) -> _Record:
         "message",
         "fields",
         "refused",
+        "request_seen",
         "node",
         "address",
         record_key(protocol.address_name or ""),
@@ -135,7 +136,7 @@ def _record(protocol: Protocol, given: Mapping[str, Json]) -> _Record:
     message, fields = given.get("message"), given.get("fields")
     if not (isinstance(message, str) and isinstance(fields, Mapping) and set(given) <= known):
         return _Record(given)
-    others = ("message", "fields", "refused", *beside)
+    others = ("message", "fields", "refused", "request_seen", *beside)
     addresses = [given[name] for name in given if name not in others]
     fields = {**{beside[key]: value for key, value in given.items() if key in beside}, **fields}
     return _Record(fields, message, _one(tuple(map(str, addresses))) if addresses else None)

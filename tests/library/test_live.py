@@ -55,17 +55,18 @@ def test_dynamixel_sdk_reads_and_writes_a_servo() -> None:
     table = bytearray(range(200))
 
     def servo(request: Any) -> Any:
-        error, data = codec.Error.NONE, b""
         match request:
             case codec.PingRequest():
-                data = bytes((0x06, 0x04, 0x26))
+                return codec.PingResponse(node=3, model=0x0406, firmware=0x26)
             case codec.ReadRequest(start=start, size=size) if start + size <= len(table):
-                data = bytes(table[start : start + size])
+                return codec.ReadResponse(node=3, data=bytes(table[start : start + size]))
+            case codec.ReadRequest():
+                return codec.ReadFailed(node=3, error=codec.Error.DATA_RANGE)
             case codec.WriteRequest(start=start, data=written) if start + len(written) <= len(table):
                 table[start : start + len(written)] = written
+                return codec.WriteResponse(node=3)
             case _:
-                error = codec.Error.DATA_RANGE
-        return codec.Status(node=3, error=error, alert=False, data=data)
+                return codec.WriteResponse(node=3, error=codec.Error.DATA_RANGE)
 
     with serving("dynamixel_2", 3, servo) as pty:
         port, packets = PortHandler(pty.path), Protocol2PacketHandler()
@@ -76,6 +77,7 @@ def test_dynamixel_sdk_reads_and_writes_a_servo() -> None:
             assert packets.read4ByteTxRx(port, 3, 132) == (0x87868584, COMM_SUCCESS, 0)
             assert packets.write2ByteTxRx(port, 3, 10, 0x1234) == (COMM_SUCCESS, 0)
             assert table[10:12] == bytes((0x34, 0x12))
+            assert packets.read1ByteTxRx(port, 3, 250)[1:] == (COMM_SUCCESS, codec.Error.DATA_RANGE)
             assert packets.write2ByteTxRx(port, 3, 199, 1) == (COMM_SUCCESS, codec.Error.DATA_RANGE)
         finally:
             port.closePort()

@@ -31,7 +31,7 @@ def _number(value: int | str, names: Mapping[str, int]) -> int:
 
 def _error(record: Record) -> bytes:
     """The error of a status packet."""
-    if record["message"] != "status":
+    if record["message"] != "unasked":
         return b""
     names = {name: number for number, name in enumerate(_ERRORS)}
     return bytes((_number(record["error_"], names) | record["alert"] << 7,))
@@ -59,7 +59,7 @@ _KINDS: Mapping[str, tuple[int, Callable[[Fields], bytes]]] = {
         0x92,
         lambda f: b"".join(struct.pack("<BHH", p["node"], p["start"], p["size"]) for p in f["places"]),
     ),
-    "status": (0x55, _data),
+    "unasked": (0x55, _data),
 }
 UNKNOWN: frozenset[str] = frozenset()
 
@@ -84,4 +84,4 @@ def read(wire: bytes, direction: Direction) -> Record | None:
     node, error, data = packet[4], packet[8], bytes(packet[9:-2])
     named = dict(enumerate(_ERRORS)).get(error & 0x7F, error & 0x7F)
     beside = {"error_": named, "alert": bool(error & 0x80)}
-    return {"message": "status", "node": node, **beside, "fields": {"data": data.hex()}}
+    return {"message": "unasked", "node": node, **beside, "fields": {"data": data.hex()}}
