@@ -155,6 +155,16 @@ def test_all_answers_are_returned_in_their_order(loader: ModuleType) -> None:
     assert (reply.attempts, node.ends, slave.counters.answers) == (1, 1, 4)
 
 
+def test_a_choice_in_a_step(loader: ModuleType) -> None:
+    fields = "{kind: {type: u8, range: 1..2}, value: {switch: kind, cases: {1: u16, 2: u32}}}"
+    protocol, faults = loads(
+        SCHEMA.replace("fields: {start: u32}}, within", f"fields: {fields}}}, within"), "x"
+    )
+    assert protocol is not None, faults
+    found = protocol.by_name["read.place"]
+    assert (found.min_size, found.max_size) == (1, 5)
+
+
 def test_a_function_gets_the_answers_so_far(loader: ModuleType) -> None:
     seen: list[Sequence[Any]] = []
 

@@ -257,7 +257,7 @@ class _Maker:
         """Let one command be a dialogue of several frames."""
         rng = self.rng
         fit = [each for each in found["commands"].values() if self._may_have_steps(each)]
-        if not fit:
+        if not fit or "response" in found.get("defaults", {}):  # one number of all answers
             return
         command = rng.choice(fit)
         taken = {"request", "response", *found.get("replies", {}), *command.get("replies", {})}
@@ -332,10 +332,12 @@ class _Maker:
         """Replies picked by a value of the part with the direction, for all commands or for one."""
         taken = {*found["commands"], *found.get("messages", {}), *found.get("replies", {})}
         taken |= {name for spec in found["commands"].values() for name in spec.get("replies", {})}
+        steps = (step for spec in found["commands"].values() for step in spec.get("steps", ()))
+        taken |= {step["name"] for step in steps if "name" in step}
         for way in shape.ways:
             reply = {"if": {"way": way}, "fields": maker.fields(Room.of(shape))}
             owner = found if self.rng.random() < 0.6 else self.rng.choice(list(found["commands"].values()))
-            if owner is found or owner["response"] != "none":
+            if owner is found or owner.get("response") != "none":
                 owner.setdefault("replies", {})[self.words.name(taken | {"request", "response"})] = reply
 
     def _more_of(self, shape: Shape, command: Doc) -> None:
