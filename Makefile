@@ -77,6 +77,7 @@ soak: .venv/.user  ## A million transactions on a bad line, 50 000 over a pty, 2
 
 soak-schemas: .venv/.dev  ## 1 000 random whole schemas through every target, gcc and clang; writes docs/soak-schemas.md (40 minutes)
 	@$(BIN)/python -m tests.whole --seeds 1..1000 --every --report build/soak-schemas.txt --output docs/soak-schemas.md
+	@$(BIN)/python -m tests.whole --seeds 10001..11500 --pairs --every --report build/soak-pairs.txt
 
 soak-frames: .venv/.dev  ## A million mutated frames of each protocol through Python, C and interpreter; writes docs/soak-frames.md (20 minutes)
 	@$(BIN)/python -m tests.soak.frames --output docs/soak-frames.md

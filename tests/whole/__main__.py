@@ -2,6 +2,7 @@
 
 Prints a line with the seeds for each cause of a difference, and exits with 1 if there is any.
 ``--report FILE`` writes all differences with their schemas, ``--output PAGE`` the figures of a clean run.
+``--pairs`` tries only seeds that together have every pair of features of all.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ import time
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from tests.support.whole.pairs import cover
 from tests.support.whole.schemas import generate
 from tests.support.whole.trial import Effort, Outcome, run
 
@@ -60,12 +62,13 @@ class _Arguments:
     output: Path | None
     show: bool
     stop: bool
+    pairs: bool
     command: str
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the trials of a command line."""
-    arguments = _parsed(words)
+    arguments = _chosen(_parsed(words))
     if arguments.show:
         for seed in arguments.seeds:
             print(generate(seed, hostile=is_hostile(seed, arguments.names)))
@@ -94,6 +97,16 @@ def main(words: Sequence[str] | None = None) -> int:
     if arguments.output and not failed:
         arguments.output.write_text(page(outcomes, arguments.command, seconds), "utf-8")
     return int(failed)
+
+
+def _chosen(arguments: _Arguments) -> _Arguments:
+    """With `--pairs`, as few of the seeds as have every pair of features that any schema has."""
+    if not arguments.pairs:
+        return arguments
+    names = arguments.names
+    found = cover({seed: generate(seed, hostile=is_hostile(seed, names)) for seed in arguments.seeds})
+    print(found.text, flush=True)
+    return replace(arguments, seeds=found.seeds)
 
 
 def is_hostile(seed: int, names: str) -> bool:
@@ -173,6 +186,9 @@ def _parsed(words: Sequence[str] | None) -> _Arguments:
     parser.add_argument("--output", type=Path, help="page for the figures, unless there are differences")
     parser.add_argument("--report", type=Path, help="file for every difference with its schema")
     parser.add_argument("--show", action="store_true", help="print the schemas alone")
+    parser.add_argument(
+        "--pairs", action="store_true", help="only seeds that together have every pair of features of all"
+    )
     parser.add_argument("--stop", action="store_true", help="try no more seeds after a difference")
     given = parser.parse_args(words)
     effort = Effort(given.messages, given.streams, uncompiled=given.uncompiled, every=given.every)
@@ -186,6 +202,7 @@ def _parsed(words: Sequence[str] | None) -> _Arguments:
         given.output,
         given.show,
         given.stop,
+        given.pairs,
         command,
     )
 
