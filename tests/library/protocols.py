@@ -46,6 +46,7 @@ PEERS: Mapping[str, tuple[str, str]] = {
     "ppp": ("yahdlc", "python4yahdlc"),
     "shdlc": ("sensirion_shdlc_driver", "sensirion-shdlc-driver"),
     "slip": ("sliplib", "sliplib"),
+    "tmcl": ("pytrinamic", "pytrinamic"),
     "ubx": ("pyubx2", "pyubx2"),
     "visca": ("pyvisca", "pyvisca"),
     "vesc": ("pyvesc", "pyvesc"),

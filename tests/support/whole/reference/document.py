@@ -936,7 +936,9 @@ def _whole(slot: Slot, slots: Sequence[Slot]) -> Slot:
 def _answer(own: Any, common: Any) -> Any:
     """A response in its long form, or "none"."""
     given = common if own is None else own
-    return given if isinstance(given, str) else {**long_form(common or {}), **long_form(own or {})}
+    if isinstance(given, str):
+        return given
+    return {**long_form(common or {}), **({} if own is None else long_form(own))}
 
 
 def long_form(given: Any) -> Doc:
