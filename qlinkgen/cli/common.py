@@ -43,7 +43,7 @@ def load_protocol(name: str, crc: str | None = None, version: str | None = None)
         return protocol
     from qlinkgen.plan.framing import frame_plan  # noqa: PLC0415  # only this option needs the plan
 
-    if frame_plan(protocol.frame).check is None:
+    if not any(each.check for each in frame_plan(protocol.frame).every):
         raise Failure(f"--set crc={crc}: the frame of {protocol.name} has no checksum; omit the option")
     try:
         protocol = load(path, crc=crc, version=version)

@@ -38,7 +38,7 @@ def notes(found: Dissection) -> list[str]:
     if message is None:
         return []
     text = []
-    payload, check = found.cells[message.envelope.payload.name], message.envelope.check
+    payload, check = found.cells[message.envelope.payload.name], message.envelope_in(found.frame).check
     if message.payload.empty_is_default and not payload.data:
         text.append("an empty payload means every field at its default")
     if check and check.check.chained and not found.cells[check.name].data:
@@ -170,7 +170,7 @@ def _missing(found: Dissection, fault: Fault) -> Words:
             return f"{end.part.name} {length} announces {number} more than received", cause
     if found.message is None:
         return f"the {what} ends {number} too early", _LOST
-    payload, check = found.message.payload, found.message.envelope.check
+    payload, check = found.message.payload, found.message.envelope_in(found.frame).check
     beside = f", and {check.size} of {check.name}" if check else ""
     sizes = bytes_text(payload.least, payload.most)
     return f"the {what} ends {number} too early; {found.message.name} has {sizes}{beside}", _LOST

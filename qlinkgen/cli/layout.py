@@ -74,7 +74,7 @@ def _meanings(payload: PayloadPlan) -> list[Enum | Flags]:
 
 def _facts(plan: Plan, planned: MessagePlan) -> list[str]:
     message, payload = planned.message, planned.payload
-    low, high = (planned.envelope.overhead + size for size in (payload.least, payload.most))
+    low, high = planned.least_frame, planned.most_frame
     facts = [
         f"payload {bytes_text(payload.least, payload.most)}",
         f"frame {span_text(low, high)}",

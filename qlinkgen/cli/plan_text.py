@@ -42,6 +42,8 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 def envelopes(plan: Plan) -> Sequence[tuple[str, Envelope]]:
     """Return the distinct envelopes, with their titles."""
     directions = plan.protocol.directions
+    if plan.frame.kinds:
+        return [(f"Frame {each.name}", each.envelope) for each in plan.frame.kinds]
     if len({plan.frames[each].envelope for each in directions}) == 1:
         return [("Frame", plan.frames[directions[0]].envelope)]
     return [(f"Frame of a {each}", plan.frames[each].envelope) for each in directions]
@@ -81,10 +83,11 @@ def show_frame_plan(plan: Plan) -> None:
     for title, envelope in envelopes(plan):
         parts_table(frame, envelope, title, {}, coverage=True).show()
     strategy, reason = receiver_text(frame)
+    ends = [f"End of {each.name}: {end_text(each)}" for each in frame.kinds]
     paragraph(
         [
             f"Sent: {transparency_text(frame)}",
-            f"End: {end_text(frame)}",
+            *(ends or [f"End: {end_text(frame)}"]),
             f"Receiver: {strategy}; {reason}",
         ]
     )
@@ -97,7 +100,7 @@ def show_frame_plan(plan: Plan) -> None:
             id_text(frame, message.id),
             message.name,
             span_text(payload.least, payload.most),
-            span_text(message.envelope.overhead + payload.least, message.frame_size),
+            span_text(message.least_frame, message.frame_size),
             message.wire_size,
             "yes" if message.checked else "no",
         )

@@ -135,8 +135,9 @@ def echo_mode(protocol: Protocol, given: str | None) -> EchoMode:
     """Return the given mode; else a probe, unless its bytes could begin a frame."""
     if given is not None:
         return cast(EchoMode, given)
-    preamble = frame_plan(protocol.frame).envelope.preamble
-    return "auto" if preamble and not preamble.startswith(PROBE[:1]) else "none"
+    preambles = [each.envelope.preamble for each in frame_plan(protocol.frame).every]
+    told = all(preamble and not preamble.startswith(PROBE[:1]) for preamble in preambles)
+    return "auto" if told else "none"
 
 
 def counted(number: int, what: str) -> str:

@@ -229,7 +229,13 @@ def address_of(message: Message) -> int | None:
 
 def address_getter(codec: Codec) -> Callable[[Message], int | None]:
     """Return a fast `address_of` for the messages of one protocol."""
-    name = next(iter(codec.COMMANDS.values())).request.ADDRESS
+    commands = codec.COMMANDS.values()
+    names = {
+        kind.ADDRESS for each in commands for kind in (each.request, each.response, *each.replies) if kind
+    }
+    if len(names) > 1:  # some kinds of frame have none
+        return address_of
+    (name,) = names
     return attrgetter(name) if name else lambda _message: None
 
 

@@ -222,9 +222,11 @@ class Monitor:
         accepts = self._accepts.get(pending.command.name)
         if accepts and type(response) is pending.command.response:
             return accepts(pending.request, response)
-        return address_of(response) in addresses_that_answer(
-            pending.command, pending.request, self._codec.BUS
+        asked, address = (
+            addresses_that_answer(pending.command, pending.request, self._codec.BUS),
+            address_of(response),
         )
+        return address in asked or (address is None and len(asked) > 0)
 
     def _replied(self, pending: _Pending, response: Framed, now: float, *, late: bool) -> None:
         if pending.answered:

@@ -53,7 +53,7 @@ class Pending:
             return False
         if command.accepts is not None:
             return command.accepts(request, response)
-        return node == self.node or (self.to_all and command.answers_broadcast)
+        return node == self.node or self._nameless(node)
 
     def replied_by(self, message: Framed, node: int | None) -> OtherReply | None:
         """Return the reply other than the response that a message from a node is; None if it is not one."""
@@ -70,7 +70,11 @@ class Pending:
 
     def from_asked(self, node: int | None) -> bool:
         """Whether a node was asked."""
-        return node == self.node or (self.to_all and self.command.answers_broadcast)
+        return node == self.node or self._nameless(node)
+
+    def _nameless(self, node: int | None) -> bool:
+        """Whether any node may answer, or the frame of the answer does not tell which one did."""
+        return self.command.answers_broadcast if self.to_all else node is None
 
     def may_be_answered_by(self, message: Framed, node: int | None) -> bool:
         """Whether a message from a node has the class and address of an answer, to any attempt."""

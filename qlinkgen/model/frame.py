@@ -1,4 +1,4 @@
-"""The three kinds of frame: delimited by preamble, length or message; marked by a bit; and bare packets."""
+"""Frames: delimited by preamble, length or message; marked by a bit; packets; or several of the first."""
 
 from __future__ import annotations
 
@@ -361,4 +361,44 @@ class PacketFrame:
     kind = "packet"
 
 
-Frame = DelimitedFrame | MarkedFrame | PacketFrame
+@dataclass(frozen=True)
+class FrameKind:
+    """One of several kinds of frame; those of one ``family`` carry the same messages."""
+
+    name: str
+    frame: DelimitedFrame
+    family: int
+
+
+@dataclass(frozen=True)
+class FrameKinds:
+    """Several kinds of frame, told apart by the constants that they begin with.
+
+    The id of a message is its number in the frame, and above that the number of its family.
+    """
+
+    kinds: tuple[FrameKind, ...]
+
+    kind = "kinds"
+
+    @cached_property
+    def number_bits(self) -> int:
+        """Bits of the longest number of a message in a frame."""
+        return max(sum(bits.bits for bits in each.frame.id_bits) for each in self.kinds)
+
+    def base(self, family: int) -> int:
+        """What is added to the number of a message of a family."""
+        return family << self.number_bits
+
+    def carrying(self, number: int) -> tuple[FrameKind, ...]:
+        """The kinds that carry the message with an id."""
+        return tuple(each for each in self.kinds if each.family == number >> self.number_bits)
+
+    @property
+    def address(self) -> PartBits | None:
+        """The address, None if no kind has one."""
+        return next((each.frame.address for each in self.kinds if each.frame.address), None)
+
+
+OneFrame = DelimitedFrame | MarkedFrame | PacketFrame
+Frame = OneFrame | FrameKinds

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import assert_never
 
 from qlinkgen.model.fields import Value
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame, PartBits
+from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds, MarkedFrame, PacketFrame, PartBits
 from qlinkgen.model.message import Direction, Example, Message
 from qlinkgen.model.texts import Text, without_texts
 from qlinkgen.model.transaction import Bus, Command, Exchange, Reply, Unknown, exchanges_of
@@ -94,7 +94,7 @@ class Protocol:
         match self.frame:
             case MarkedFrame():
                 return self.frame.address_name
-            case DelimitedFrame():
+            case DelimitedFrame() | FrameKinds():
                 return self.frame.address.name if self.frame.address else None
             case PacketFrame():
                 return None
@@ -125,8 +125,10 @@ class Protocol:
     @property
     def part_sections(self) -> dict[str, str]:
         """Sections of the document that describe parts of the frame, by part."""
-        parts = self.frame.parts if isinstance(self.frame, DelimitedFrame) else ()
-        return {part.name: part.section for part in parts}
+        frames = [self.frame] if isinstance(self.frame, DelimitedFrame) else []
+        if isinstance(self.frame, FrameKinds):
+            frames = [each.frame for each in self.frame.kinds]
+        return {part.name: part.section for frame in frames for part in frame.parts}
 
     def command_of(self, message: Message) -> Command | None:
         """The transaction of a message, None if it has none."""

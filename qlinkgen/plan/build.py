@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import assert_never
 
+from qlinkgen.model.frame import Frame, FrameKinds
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import select
@@ -26,7 +27,7 @@ from qlinkgen.plan.parts import (
 from qlinkgen.plan.planning import payload_plan
 from qlinkgen.plan.select import Options
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
-from qlinkgen.plan.tree import MessagePlan, Plan
+from qlinkgen.plan.tree import MessagePlan, Plan, shortest
 
 
 def plan_of(protocol: Protocol, options: Options | None = None) -> Plan:
@@ -41,7 +42,12 @@ def plan_of(protocol: Protocol, options: Options | None = None) -> Plan:
         role=options.role,
         frames=frames,
         messages=tuple(
-            _message(frames[message.direction], message, options, asked=protocol.is_asked(message))
+            _message(
+                _carrying(protocol.frame, frames[message.direction], message),
+                message,
+                options,
+                asked=protocol.is_asked(message),
+            )
             for message in messages
         ),
         commands=tuple(command for command in protocol.commands if command.request.name in names),
@@ -51,14 +57,32 @@ def plan_of(protocol: Protocol, options: Options | None = None) -> Plan:
     )
 
 
-def _message(frame: FramePlan, message: Message, options: Options, *, asked: bool) -> MessagePlan:
+def _carrying(stated: Frame, frame: FramePlan, message: Message) -> tuple[FramePlan, ...]:
+    """The kinds of frame that carry a message, the shortest first."""
+    if not isinstance(stated, FrameKinds):
+        return (frame,)
+    names = {each.name for each in stated.carrying(message.id)}
+    kinds = [each for each in frame.kinds if each.name in names]
+    return tuple(sorted(kinds, key=lambda each: each.envelope.payload.most))
+
+
+def _message(
+    frames: tuple[FramePlan, ...], message: Message, options: Options, *, asked: bool
+) -> MessagePlan:
+    frame = frames[-1]
     payload = payload_plan(message, frame.envelope.payload.trim)
     envelope = frame.with_check(checked=message.checksum)
     size = envelope.overhead + payload.most
+    if len(frames) > 1:
+        # A payload of the greatest size need not be in the longest frame.
+        sizes = {payload.most, *(each.max_payload for each in frames)}
+        inside = [each for each in sizes if payload.least <= each <= payload.most]
+        size = max(each + shortest(frames, each).envelope.overhead for each in inside)
     size += envelope.blocks.added(payload.most) if envelope.blocks else 0
     return MessagePlan(
         message=message,
         payload=payload,
+        frames=frames,
         envelope=envelope,
         allowed=OneOf(tuple(Within(*each) for each in message.addresses)) if message.addresses else None,
         frame_size=size,

@@ -42,6 +42,7 @@ from qlinkgen.plan.content import BadContent, Raw, Unsendable
 from qlinkgen.plan.ended import frame_reader
 from qlinkgen.plan.ends import Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.envelope import Envelope
+from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
     AddressPart,
     AddressSlot,
@@ -133,7 +134,9 @@ class Codec:
     ) -> bytes:
         """A valid frame around a payload, which is not checked; ``beside`` are values of the frame."""
         message = self.plan.message(name)
-        return self.join(message, self.cells(message, self.sent(payload), address, beside), request)
+        frame = message.frame_for(len(payload))
+        cells = self.cells(message, self.sent(payload), address, beside, frame)
+        return self.join(message, cells, request, frame)
 
     def sent(self, payload: bytes) -> bytes:
         """The payload as a length counts it: with inserted bytes if only the payload is stuffed."""
@@ -141,20 +144,39 @@ class Codec:
         return transparency.rule.encode(payload) if isinstance(transparency, PayloadStuffing) else payload
 
     def cells(
-        self, message: MessagePlan, sent: bytes, address: int = 0, beside: Mapping[str, Raw] = _NONE
+        self,
+        message: MessagePlan,
+        sent: bytes,
+        address: int = 0,
+        beside: Mapping[str, Raw] = _NONE,
+        frame: FramePlan | None = None,
     ) -> dict[str, bytes]:
-        """The bytes of each part except check values, and of seeds; ``beside`` are values of the frame."""
-        given = Given(len(sent), message.id, address, beside)
+        """The bytes of each part except check values, and of seeds; ``beside`` are values of the frame.
+
+        ``frame`` is the kind of frame; by default the one for a payload of this size.
+        """
+        given = Given(len(sent), message.number, address, beside)
+        envelope = message.envelope_in(frame or message.frame_for(len(sent)))
         parts = {
             part.name: sent if isinstance(part, PayloadPart) else _cell(part, given)
-            for part in message.envelope.parts
+            for part in envelope.parts
             if not isinstance(part, CheckPart | BlocksPart)
         }
         return {**parts, **dict(message.message.seeds)}
 
-    def join(self, message: MessagePlan, cells: Mapping[str, bytes], request: bytes = b"") -> bytes:
-        """The frame of these parts as sent; computes the check values that are not among them."""
-        envelope, transparency = message.envelope, self.plan.frames[message.direction].transparency
+    def join(
+        self,
+        message: MessagePlan,
+        cells: Mapping[str, bytes],
+        request: bytes = b"",
+        frame: FramePlan | None = None,
+    ) -> bytes:
+        """The frame of these parts as sent; computes the check values that are not among them.
+
+        ``frame`` is the kind of frame; by default the one for a payload of this size.
+        """
+        frame = frame or message.frame_for(len(cells[message.envelope.payload.name]))
+        envelope, transparency = message.envelope_in(frame), frame.transparency
         for part in envelope.filling:
             if part.name not in cells:
                 value = self.check_value(part, envelope, cells, request)
@@ -163,14 +185,14 @@ class Codec:
             payload = cells[envelope.payload.name]
             sent = blocks.join(payload, cells.get(blocks.name, blocks.values(payload)))
             cells = {**cells, envelope.payload.name: sent, blocks.name: b""}
-        frame = b"".join(cells[each.name] for each in envelope.parts)
+        whole = b"".join(cells[each.name] for each in envelope.parts)
         match transparency:
             case FrameStuffing():
-                return transparency.stuff(frame)
+                return transparency.stuff(whole)
             case Coded():
-                return transparency.encode(frame)
+                return transparency.encode(whole)
             case Plain() | SevenBit() | PayloadStuffing():
-                return frame
+                return whole
             case _:
                 assert_never(transparency)
 
@@ -215,7 +237,8 @@ class Codec:
     def judge(self, taken: Taken, direction: Direction, request: bytes = b"") -> Decoded:
         """Check a frame whose parts have been read and decode its message. Raises BadFrame."""
         message = self.plan.known(direction).get(-1 if taken.number is None else taken.number)
-        envelope = message.envelope if message else self.plan.frames[direction].envelope
+        frame = taken.frame or self.plan.frames[direction]
+        envelope = message.envelope_in(frame) if message else frame.envelope
         for part in envelope.checks:
             if part not in envelope.seeded:
                 self._verify(part, envelope, taken, taken.cells, request)

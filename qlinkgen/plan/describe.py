@@ -24,7 +24,7 @@ from qlinkgen.model.types import (
 from qlinkgen.model.values import native_from_raw
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
-from qlinkgen.plan.ends import ByLength, ByMark, ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
@@ -421,6 +421,11 @@ def id_text(frame: FramePlan, number: int) -> str:
             return str(number)
         case ByLength() | ByMessage() | ByTerminator():
             return f"0x{number:02X}"
+        case ByKind():
+            base = max(each.base for each in frame.kinds if each.base <= number)
+            names = "/".join(each.name for each in frame.kinds if each.base == base)
+            text = f"0x{number - base:02X}"
+            return text if len({each.base for each in frame.kinds}) == 1 else f"{names} {text}"
         case _:
             assert_never(end)
 
@@ -453,16 +458,19 @@ def _end_text(frame: FramePlan) -> str:
             return f"the next {end.part.data.hex(' ').upper()}{begins}{after}"
         case ByMark():
             return f"the next byte with bit 0x{end.header.marker:02X} set"
+        case ByKind():
+            return "that of its kind, which its first bytes tell"
         case _:
             assert_never(end)
 
 
 def transparency_text(frame: FramePlan) -> str:
     """The stuffing of a frame."""
-    way, envelope = frame.transparency, frame.envelope
+    way = frame.transparency
+    if isinstance(way, Plain):
+        return "bytes are sent as they are"
+    envelope = frame.envelope
     match way:
-        case Plain():
-            return "bytes are sent as they are"
         case SevenBit():
             return f"no byte between header and end has bit 0x{way.marker:02X} set"
         case FrameStuffing():
@@ -510,7 +518,8 @@ def _after_text(way: FrameStuffing | PayloadStuffing) -> str:
 
 def receiver_text(frame: FramePlan) -> tuple[str, str]:
     """The strategy of a receiver, and its reason."""
-    way, preamble = frame.receiver, frame.envelope.preamble.hex(" ").upper()
+    way = frame.receiver
+    preamble = " or ".join(each.envelope.preamble.hex(" ").upper() for each in frame.every)
     match way:
         case Hunt():
             return "hunt", (

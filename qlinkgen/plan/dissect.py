@@ -16,8 +16,9 @@ from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.content import BadContent, MoreNeeded, broken, measure
-from qlinkgen.plan.ends import ByLength, ByMark, ByMessage, ByTerminator, Hunt
+from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, ByTerminator, Hunt
 from qlinkgen.plan.fields import Fields
+from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
     AddressPart,
     BlocksPart,
@@ -53,6 +54,14 @@ def dissect(plan: Plan, wire: bytes, direction: Direction, request: bytes = b"")
         kind = ""
     walk = _EndedWalk if isinstance(plan.frame.end, ByTerminator) else _Walk
     return walk(codec, wire, direction, request, kind).run()
+
+
+def _kind_of(frame: FramePlan, wire: bytes) -> FramePlan:
+    """The kind of the frame, or else the one of which the bytes hold the first beginning."""
+    kinds = [(each.envelope.preamble, each) for each in frame.kinds]
+    begun = (each for first, each in kinds if first.startswith(wire[: len(first)]))
+    held = [(at, each) for first, each in kinds if (at := wire.find(first)) >= 0]
+    return next(begun, min(held, key=lambda each: each[0])[1] if held else frame.every[0])
 
 
 def request_size(plan: Plan, wire: bytes) -> int:
@@ -97,7 +106,7 @@ class _Walk:
     """Divides one frame into parts, then checks them."""
 
     def __init__(self, codec: Codec, wire: bytes, direction: Direction, request: bytes, kind: str) -> None:
-        self.codec, self.plan, self.frame = codec, codec.plan, codec.plan.frames[direction]
+        self.codec, self.plan, self.frame = codec, codec.plan, _kind_of(codec.plan.frames[direction], wire)
         self.wire, self.direction, self.request, self.kind = wire, direction, request, kind
         self.known = self.plan.known(direction)
         self.envelope = self.frame.envelope
@@ -134,6 +143,7 @@ class _Walk:
             self.plan, self.direction, self.wire, self.request, self.message, self.number, self.address,
             tuple(sorted(self.spans, key=lambda span: span.places[0])),
             tuple(dict.fromkeys(faults)), self.kind, {**self.cells, **self._seeds()}, self.expected,
+            self.frame,
         )  # fmt: skip
 
     def _seeds(self) -> dict[str, Cell]:
@@ -191,7 +201,7 @@ class _Walk:
                 self._bound(part)
         self._identify()
         if self.message is not None:
-            self.envelope = self.message.envelope
+            self.envelope = self.message.envelope_in(self.frame)
         self._take_payload()
         for part in self.envelope.back:
             if isinstance(part, BlocksPart):
@@ -230,8 +240,8 @@ class _Walk:
                     return
             case ByMark():
                 size = self._marked_size(end)
-            case ByTerminator():
-                raise AssertionError("the terminator is found first")
+            case ByTerminator() | ByKind():
+                raise AssertionError("the terminator or the kind is found first")
             case ByMessage() if self.frame.needs_request:
                 payload = self.message.payload if self.message else None
                 size = max(payload.least, min(payload.most, self._left() - trailer)) if payload else 0
@@ -298,7 +308,8 @@ class _Walk:
             self.number, self.address = first.id_of(byte), first.address_of(byte)
         else:
             cells = {name: cell.data for name, cell in self.cells.items()}
-            self.number = gathered(self.envelope.id, cells)
+            number = gathered(self.envelope.id, cells)
+            self.number = None if number is None else number + self.frame.base
             self.address = gathered(self.envelope.address, cells) if self.envelope.address else None
         self.message = None if self.number is None else self._told(self.known.get(self.number))
 

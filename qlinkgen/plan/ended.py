@@ -9,7 +9,7 @@ from qlinkgen.plan.ends import ByTerminator
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import LengthPart, PayloadPart
-from qlinkgen.plan.reading import BadFrame, FrameReader, Incomplete, NoFrame, Taken, is_wrong
+from qlinkgen.plan.reading import BadFrame, FrameReader, Incomplete, KindsReader, NoFrame, Taken, is_wrong
 from qlinkgen.plan.transparency import Coded
 from qlinkgen.plan.tree import MessagePlan
 
@@ -126,7 +126,9 @@ class EndedReader(FrameReader):
                 self._check_known(taken.end, taken)
 
 
-def frame_reader(plan: FramePlan, known: Mapping[int, MessagePlan]) -> FrameReader:
+def frame_reader(plan: FramePlan, known: Mapping[int, MessagePlan]) -> FrameReader | KindsReader:
     """The reader of frames of parts; ``known`` are the messages of their direction, by number."""
+    if plan.kinds:
+        return KindsReader(plan, known)
     kind = EndedReader if isinstance(plan.end, ByTerminator) else FrameReader
     return kind(plan, known)

@@ -52,7 +52,12 @@ class ByTerminator:
         return at
 
 
-End = ByLength | ByMessage | ByMark | ByTerminator
+@dataclass(frozen=True, slots=True)
+class ByKind:
+    """Each kind of frame has an end of its own."""
+
+
+End = ByLength | ByMessage | ByMark | ByTerminator | ByKind
 
 
 # How a receiver finds frames

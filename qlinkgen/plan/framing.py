@@ -8,16 +8,25 @@ protocol is an id and a payload, its response a payload and a check value.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import assert_never
 
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame, PartBits, Silence
+from qlinkgen.model.frame import (
+    DelimitedFrame,
+    Frame,
+    FrameKinds,
+    MarkedFrame,
+    PacketFrame,
+    PartBits,
+    Silence,
+)
 from qlinkgen.model.frame import Part as StatedPart
 from qlinkgen.model.integer import Integer, byte_chunks
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.coding import Insertion, stage
 from qlinkgen.plan.ends import (
+    ByKind,
     ByLength,
     ByMark,
     ByMessage,
@@ -70,6 +79,9 @@ class FramePlan:
         address: name of the address, "" if there is none.
         id_name: name of the message number.
         idle: silence on the line that ends a frame early, None if the document states none.
+        kinds: the kinds of frame, () if there is one; each with its own ``envelope``.
+        name: name of the kind, "" if there is one.
+        base: what is added to the number of a message in frames of this kind.
     """
 
     envelope: Envelope
@@ -79,6 +91,14 @@ class FramePlan:
     address: str
     id_name: str
     idle: Silence | None = None
+    kinds: tuple[FramePlan, ...] = ()
+    name: str = ""
+    base: int = 0
+
+    @property
+    def every(self) -> tuple[FramePlan, ...]:
+        """The kinds of frame, or the only one."""
+        return self.kinds or (self,)
 
     @property
     def search(self) -> Mapping[str, object]:
@@ -97,7 +117,9 @@ class FramePlan:
 
     @property
     def check(self) -> Check | None:
-        """The main check value, None where there is none."""
+        """The main check value, of the first kind that has one; None where there is none."""
+        if self.kinds:
+            return next((each.check for each in self.kinds if each.check), None)
         part = self.envelope.check
         return part.check if part else None
 
@@ -109,6 +131,8 @@ class FramePlan:
     @property
     def checks_header(self) -> bool:
         """Whether only message number and address in the header distinguish a frame from noise."""
+        if self.kinds:
+            return False
         envelope = self.envelope
         identifying = (part for part in envelope.front if envelope.identifies(part))
         bare = isinstance(self.receiver, Rescan) and self.receiver.bare
@@ -117,11 +141,18 @@ class FramePlan:
     @property
     def max_payload(self) -> int:
         """Maximum payload size of the frame."""
-        return self.envelope.payload.most
+        return max(each.envelope.payload.most for each in self.every)
+
+    def holds(self, size: int) -> bool:
+        """Whether a payload of a size fits."""
+        part = self.envelope.payload
+        return part.least <= size <= part.most
 
     @property
     def max_wire(self) -> int:
         """Maximum size on the wire of a frame, valid or not."""
+        if self.kinds:
+            return max(each.max_wire for each in self.kinds)
         most = self.envelope.max_frame
         stuffing = self.transparency
         return stuffing.most_frame(most) if isinstance(stuffing, FrameStuffing | Coded) else most
@@ -129,13 +160,15 @@ class FramePlan:
     @property
     def longest(self) -> int:
         """Number of bytes after which a receiver reports bytes outside of frames."""
+        if self.kinds:
+            return self.max_wire
         return self.max_wire if isinstance(self.end, ByTerminator) else self.envelope.max_frame
 
     @property
     def flag(self) -> bytes:
         """The bytes that both begin and end a frame, b"" if no bytes do."""
         end = self.end.part.data if isinstance(self.end, ByTerminator) else b""
-        return end if end == self.envelope.preamble else b""
+        return end if end and end == self.envelope.preamble else b""
 
     @property
     def lines(self) -> bool:
@@ -172,6 +205,8 @@ def frame_plan(frame: Frame, direction: Direction = "response") -> FramePlan:
             return _marked(frame)
         case PacketFrame():
             return _packet(frame, direction)
+        case FrameKinds():
+            return _kinds(frame, direction)
         case _:
             assert_never(frame)
 
@@ -182,6 +217,26 @@ def frame_plans(frame: Frame) -> Mapping[Direction, FramePlan]:
     same = not (isinstance(frame, PacketFrame) or (isinstance(frame, DelimitedFrame) and frame.directed))
     request = response if same else frame_plan(frame, "request")
     return {"request": request, "response": response, "message": request}
+
+
+def _kinds(frame: FrameKinds, direction: Direction) -> FramePlan:
+    """Several kinds: each has a plan of its own."""
+    kinds = tuple(
+        replace(_delimited(each.frame, direction), name=each.name, base=frame.base(each.family))
+        for each in frame.kinds
+    )
+    receivers = [each.receiver for each in kinds]
+    return FramePlan(
+        envelope=Envelope(()),
+        end=ByKind(),
+        transparency=Plain(),
+        receiver=Rescan(
+            bare=False, verified=all(isinstance(each, Rescan) and each.verified for each in receivers)
+        ),
+        address=next((each.address for each in kinds if each.address), ""),
+        id_name=next((each.id_name for each in kinds if each.id_name), ""),
+        kinds=kinds,
+    )
 
 
 def _delimited(whole: DelimitedFrame, direction: Direction) -> FramePlan:

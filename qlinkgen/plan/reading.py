@@ -12,7 +12,7 @@ from typing import assert_never
 
 from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure
-from qlinkgen.plan.ends import ByLength, ByMark, ByMessage, ByTerminator, Rescan
+from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, ByTerminator, Rescan
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
     AddressPart,
@@ -98,6 +98,7 @@ class Taken:
         end: wire offset of its end.
         due: the inserted byte that may follow the end, b"" if none may.
         kept: number of its last bytes that may begin the next frame.
+        frame: its plan, None where there is one kind of frame.
     """
 
     cells: dict[str, bytes] = field(default_factory=dict)
@@ -107,6 +108,7 @@ class Taken:
     end: int = 0
     due: bytes = b""
     kept: int = 0
+    frame: FramePlan | None = None
 
 
 class Cursor:
@@ -258,7 +260,8 @@ class FrameReader:
         return 0
 
     def _identify(self, taken: Taken) -> None:
-        taken.number = gathered(self._envelope.id, taken.cells)
+        number = gathered(self._envelope.id, taken.cells)
+        taken.number = None if number is None else number + self._plan.base
         taken.address = gathered(self._envelope.address, taken.cells) if self._envelope.address else None
 
     def _check_known(self, at: int, taken: Taken) -> None:
@@ -280,8 +283,8 @@ class FrameReader:
                 sent = self._take(cursor, part, end.part.payload(length))
             case ByMessage():
                 sent = self._measured(cursor, part, taken)
-            case ByMark() | ByTerminator():
-                raise AssertionError("marks or a terminator are found first")
+            case ByMark() | ByTerminator() | ByKind():
+                raise AssertionError("marks, a terminator or the kind are found first")
             case _:
                 assert_never(end)
         taken.cells[part.name] = sent
@@ -323,6 +326,27 @@ class FrameReader:
         if len(payload) > self._envelope.payload.most:
             raise BadFrame("length", taken.end)
         return payload
+
+
+class KindsReader:
+    """Reads frames of several kinds, of which at most one begins at a place."""
+
+    def __init__(self, plan: FramePlan, known: Mapping[int, MessagePlan]) -> None:
+        """``known`` are the messages of the direction of the frames, by number."""
+        self._kinds = [(each, FrameReader(each, known)) for each in plan.kinds]
+
+    def read(self, wire: bytes, start: int = 0, *, hunting: bool = False) -> Taken:
+        """The frame that begins at ``start``; see `FrameReader.read`."""
+        none = NoFrame("frame", start)
+        for kind, reader in self._kinds:
+            try:
+                taken = reader.read(wire, start, hunting=hunting)
+            except NoFrame as no_frame:
+                none = max(none, no_frame.with_traceback(None), key=lambda each: each.at)
+            else:
+                taken.frame = kind
+                return taken
+        raise none
 
 
 def is_wrong(part: Part, cells: Mapping[str, bytes]) -> bool:

@@ -179,7 +179,10 @@ class RescanningReceiver(Receiver):
         assert isinstance(self.frame.receiver, Rescan)
         self._strategy = self.frame.receiver
         self._reader = frame_reader(self.frame, self.known)
-        self._first, self._longest = self.frame.envelope.preamble[:1], self.frame.longest
+        preambles = [each.envelope.preamble for each in self.frame.every]
+        #: The bytes with which a frame may begin, b"" if any may.
+        self._first = b"".join(each[:1] for each in preambles)
+        self._longest = self.frame.longest
         self._buffer, self._skipped, self._due = b"", b"", b""
         end = self.frame.end
         #: The terminator if only it may precede a frame.
@@ -202,9 +205,9 @@ class RescanningReceiver(Receiver):
             if due and self._buffer[:1] == due:
                 self._buffer = self._buffer[1:]
                 continue
-            if self._first and self._buffer[:1] != self._first:
+            if self._first and self._buffer[0] not in self._first:
                 # As for NoFrame below, but for several bytes at once: most bytes do not begin a frame.
-                at = self._buffer.find(self._first)
+                at = next((at for at, byte in enumerate(self._buffer) if byte in self._first), 0)
                 self._buffer = self._buffer[at:] if at > 0 else b""
                 continue
             try:
@@ -241,7 +244,9 @@ class RescanningReceiver(Receiver):
     def _whole(self, taken: Taken) -> Iterator[Event]:
         raw = self._buffer[: taken.end]
         event = self.judged(taken, raw, self._start)
-        proven = self._strategy.proves(event.kind)
+        strategy = taken.frame.receiver if taken.frame else self._strategy
+        assert isinstance(strategy, Rescan)
+        proven = strategy.proves(event.kind)
         if event.kind != "message" and not proven:
             yield from self._drop(event.kind, raw)
             return

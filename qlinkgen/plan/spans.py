@@ -147,6 +147,7 @@ class Dissection:
         kind: the kind of error that `Codec.decode` raises, "" for a valid frame.
         cells: the parts found, and seeds of the check value, whose places are -1.
         expected: the right check values that are known, by part.
+        frame: the plan of the frame, of its kind if there are several.
     """
 
     plan: Plan
@@ -161,8 +162,4 @@ class Dissection:
     kind: str
     cells: Mapping[str, Cell]
     expected: Mapping[str, int]
-
-    @property
-    def frame(self) -> FramePlan:
-        """The frame of its direction."""
-        return self.plan.frames[self.direction]
+    frame: FramePlan

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import get_args
@@ -19,6 +19,11 @@ from qlinkgen.plan.payload import Member, PayloadPlan
 from qlinkgen.plan.select import Role
 
 
+def shortest(frames: Sequence[FramePlan], size: int) -> FramePlan:
+    """The first kind of frame with room for a payload of a size, else the last."""
+    return next((each for each in frames if each.holds(size)), frames[-1])
+
+
 @dataclass(frozen=True, eq=False)
 class MessagePlan:
     """A message: its description in the document, and the steps of its payload.
@@ -26,7 +31,8 @@ class MessagePlan:
     Attributes:
         message: names, numbers and texts, as the document states them.
         payload: the steps; equal layouts compare equal.
-        envelope: the parts of its frame, without the check value if the message has none.
+        frames: the kinds of frame that may carry it, the shortest first.
+        envelope: the parts of its longest frame, without the check value if the message has none.
         allowed: addresses that it may carry, None if the frame has no address.
         frame_size: maximum size of its frame before stuffing.
         wire_size: maximum size on the wire.
@@ -37,6 +43,7 @@ class MessagePlan:
 
     message: Message
     payload: PayloadPlan
+    frames: tuple[FramePlan, ...]
     envelope: Envelope
     allowed: OneOf | None
     frame_size: int
@@ -59,6 +66,29 @@ class MessagePlan:
     def direction(self) -> Direction:
         """Whether the master or the slave sends it, or both."""
         return self.message.direction
+
+    @property
+    def number(self) -> int:
+        """Its number in its frame, without that of the family of kinds."""
+        return self.message.id - self.frames[-1].base
+
+    @property
+    def least_frame(self) -> int:
+        """Minimum size of its frame before stuffing."""
+        return self.envelope_in(self.frame_for(self.payload.least)).overhead + self.payload.least
+
+    @property
+    def most_frame(self) -> int:
+        """Size of its frame around the longest payload, before stuffing."""
+        return self.envelope_in(self.frame_for(self.payload.most)).overhead + self.payload.most
+
+    def frame_for(self, size: int) -> FramePlan:
+        """The shortest kind of frame for a payload of a size; the longest if none has room for it."""
+        return shortest(self.frames, size)
+
+    def envelope_in(self, frame: FramePlan) -> Envelope:
+        """The parts of its frame of a kind."""
+        return self.envelope if frame is self.frames[-1] else frame.envelope
 
     @property
     def checked(self) -> bool:
@@ -113,7 +143,7 @@ class Plan:
     @cached_property
     def beside(self) -> Mapping[str, Member]:
         """The values of frames of any direction, by name."""
-        frames = (self.frames["request"], self.frame)
+        frames = (*self.frames["request"].every, *self.frame.every)
         return {member.name: member for frame in frames for _, member in frame.envelope.values}
 
     @cached_property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import assert_never
 
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
+from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds, MarkedFrame, PacketFrame
 from qlinkgen.model.transaction import Bus
 from qlinkgen.schema.report import Reporter
 
@@ -37,7 +37,7 @@ def _highest(frame: Frame) -> int | None:
     match frame:
         case MarkedFrame():
             return frame.address_bits.mask
-        case DelimitedFrame():
+        case DelimitedFrame() | FrameKinds():
             return (1 << frame.address.bits) - 1 if frame.address else None
         case PacketFrame():
             return None

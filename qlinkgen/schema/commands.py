@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import assert_never
 
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
+from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Addressing, Allowance, Bus, Command, Many, Repeat, Reply
 from qlinkgen.model.types import Scalar
@@ -14,10 +14,11 @@ from qlinkgen.schema.constants import MAX_BITS
 from qlinkgen.schema.file_commands import AnswerSpec, CommandSpec, RepeatSpec, ResponseWord
 from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.file_model import SchemaFile
+from qlinkgen.schema.kind_messages import AnyMessages, KindMessages
 from qlinkgen.schema.kinds import Label
 from qlinkgen.schema.layouts import fields_of, fields_path
 from qlinkgen.schema.many import ManyBuilder
-from qlinkgen.schema.messages import MessageBuilder, Written
+from qlinkgen.schema.messages import Written
 from qlinkgen.schema.notation import AnswerId, Duration, StatedId, shown
 from qlinkgen.schema.replies import ReplyBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -54,7 +55,7 @@ class CommandBuilder:
     """Builds the messages and commands of one file."""
 
     def __init__(
-        self, file: SchemaFile, report: Reporter, messages: MessageBuilder, frame: Frame | None, bus: Bus
+        self, file: SchemaFile, report: Reporter, messages: AnyMessages, frame: Frame | None, bus: Bus
     ) -> None:
         """``frame`` is None if it could not be built; checks that depend on it are skipped."""
         self._file = file
@@ -92,6 +93,8 @@ class CommandBuilder:
 
     def _carry(self) -> None:
         """Add the message that carries the answers which only their request tells apart."""
+        if isinstance(self._build, KindMessages):  # such answers may be in different kinds of frame
+            return
         steps = {name for name, spec in self._file.commands.items() if spec.steps is not None}
         others = steps | self._singles.keys()
         answers = [m for m in self.messages if m.direction == "response" and m.command not in others]
@@ -187,7 +190,13 @@ class CommandBuilder:
         section, build = self._section(spec), self._build.directed
         place = (*path, "request") if spec.request is not None else ("defaults", "request")
         written = Written(
-            "request", StatedId(spec.id), (*path, "id"), request or {}, place, (), spec.separator
+            "request",
+            StatedId(spec.id),
+            (*path, "id"),
+            request or {},
+            place,
+            separator=spec.separator,
+            kind=spec.frame or defaults.frame,
         )
         asked = build(name, spec, written, addressing=addressing, section=section)
         self.messages.append(asked)
@@ -219,8 +228,21 @@ class CommandBuilder:
             fields or {},
             fields_path(given, place),
             separator=spec.separator,
+            kind=self._answer_kind(spec),
+            inherited=number.relative,
         )
         return given if isinstance(given, str) else fields, written
+
+    def _answer_kind(self, spec: CommandSpec) -> str | None:
+        """The kind of frame of a response: the nearest that is stated."""
+        own, common = spec.response, self._file.defaults.response
+        stated = (
+            own.frame if isinstance(own, AnswerSpec) else None,
+            spec.frame,
+            common.frame if isinstance(common, AnswerSpec) else None,
+            self._file.defaults.frame,
+        )
+        return next((kind for kind in stated if kind is not None), None)
 
     def _named_response(self, name: str, path: Path) -> Message | None:
         """The message that is the response of a command."""
@@ -367,7 +389,7 @@ class CommandBuilder:
     def _check_id_fits(self, message: Message, path: Path) -> None:
         most = 0xFF
         match self._frame:
-            case DelimitedFrame():
+            case DelimitedFrame() | FrameKinds():
                 return  # checked when it was composed
             case MarkedFrame():
                 most = self._frame.id_bits.mask

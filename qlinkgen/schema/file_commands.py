@@ -91,6 +91,7 @@ class MeansSpec(FileMapping):
 class AnswerSpec(FileMapping):
     """The long form of a response: its number and its fields."""
 
+    frame: Name | None = Field(default=None, description="Kind of its frame, if there are several")
     id: AnswerNumber | None = Field(default=None, description="Its number, if it is not that of the request")
     fields: Fields | None = Field(default=None, description="Its fields, in wire order")
     means: Annotated[MeansSpec, ShortForm("default", "string")] | None = Field(
@@ -155,6 +156,7 @@ Response = Annotated[
 class StepMessageSpec(FileMapping):
     """The long form of a message of a dialogue: its number and its fields."""
 
+    frame: Name | None = Field(default=None, description="Kind of its frame, if there are several")
     id: AnswerNumber | None = Field(default=None, description="Its number, if it is not that of the request")
     fields: Fields = Field(description="Its fields, in wire order")
 
@@ -218,6 +220,7 @@ class ManySpec(FileMapping):
 class ReplySpec(Fact):
     """An answer other than the response."""
 
+    frame: Name | None = Field(default=None, description="Kind of its frame, if there are several")
     id: AnswerNumber | None = Field(default=None, description="Its number: 0x15 or request.id + 0x80")
     separator: Separator | None = Field(
         default=None, description="Character between the fields, which are texts; none: there is none"
@@ -257,6 +260,9 @@ MessageId = Annotated[
 class DefaultsSpec(FileMapping):
     """Defaults for commands."""
 
+    frame: Name | None = Field(
+        default=None, description="Kind of the frames, unless request or response name another"
+    )
     section: Text | None = Field(default=None, description="Section of the source document")
     request: Fields | None = Field(default=None, description="Fields of the request, {} for none")
     response: Response | None = Field(
@@ -299,6 +305,9 @@ class ExampleSpec(FileMapping):
 class CommandSpec(Fact, Lifetime):
     """A transaction: request, response and their conditions."""
 
+    frame: Name | None = Field(
+        default=None, description="Kind of its frames, unless the response names another"
+    )
     section: Text | None = Field(  # type: ignore[assignment]  # None: that of `defaults`
         default=None, description="Section of the source document that states it"
     )
@@ -336,6 +345,7 @@ class CommandSpec(Fact, Lifetime):
 class MessageSpec(Fact, Lifetime):
     """A message without a response."""
 
+    frame: Name | None = Field(default=None, description="Kind of its frame, if there are several")
     id: MessageId | None = Field(
         default=None, description="Its number in the frame; PART: NUMBER for each part, if there are several"
     )

@@ -309,3 +309,9 @@ class FrameSpec(Fact):
     )
     marked: MarkedSpec | None = Field(default=None, description="Header and end are marked by a bit")
     packet: Parts | None = Field(default=None, description="No frame: message id, words, checksum")
+
+
+class KindSpec(Fact):
+    """One of several kinds of frame."""
+
+    parts: Parts = Field(min_length=1, description="Parts in wire order; the first is a constant")

@@ -14,7 +14,7 @@ from pydantic.json_schema import JsonSchemaValue
 from qlinkgen.schema.file_base import FileMapping
 from qlinkgen.schema.file_commands import CommandSpec, DefaultsSpec, MessageSpec, Replies
 from qlinkgen.schema.file_fields import EnumSpec, FlagsSpec, GroupSpec, TypeSpec
-from qlinkgen.schema.file_frames import FrameSpec
+from qlinkgen.schema.file_frames import FrameSpec, KindSpec
 from qlinkgen.schema.kinds import Count, Id, Label, Name, Order, Text, Time, WholeRange
 
 
@@ -72,7 +72,13 @@ class SchemaFile(FileMapping):
     enums: dict[str, EnumSpec] = Field(default_factory=dict, description="Named numbers")
     flags: dict[str, FlagsSpec] = Field(default_factory=dict, description="Named bits")
     types: dict[str, TypeSpec] = Field(default_factory=dict, description="Named types of fields, and records")
-    frame: FrameSpec = Field(description="The frame around each message")
+    frame: FrameSpec = Field(
+        default_factory=FrameSpec, description="The frame around each message, unless there are several kinds"
+    )
+    frames: dict[str, KindSpec] = Field(
+        default_factory=dict,
+        description="Kinds of frame by name, told apart by the constants they begin with",
+    )
     bus: BusSpec = Field(description="The line and its nodes")
     attributes: dict[str, AttributeSpec] = Field(
         default_factory=dict, description="Protocol-specific attributes of commands"

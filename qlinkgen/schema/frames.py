@@ -8,7 +8,7 @@ from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.frame import ATTRIBUTE, Checksum, DelimitedFrame, Frame, MarkedFrame, PacketFrame, Part
 from qlinkgen.model.types import Chunk
 from qlinkgen.schema.coding import CodingBuilder
-from qlinkgen.schema.file_frames import MarkedSpec, PartSpec
+from qlinkgen.schema.file_frames import FrameSpec, KindSpec, MarkedSpec, PartSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.part_directions import check_directions
@@ -28,10 +28,30 @@ def payload_bounds(file: SchemaFile) -> tuple[int, int]:
     """Minimum and maximum payload size of the frame; the widest bounds if it states none."""
     if file.frame.marked is not None:
         return file.frame.marked.payload
-    parts = {**(file.frame.parts or {}), **(file.frame.packet or {})}
-    return next(
-        (part.size for part in parts.values() if part.told == "payload" and part.size), (0, MAX_PAYLOAD)
+    groups = [{**(file.frame.parts or {}), **(file.frame.packet or {})}]
+    if file.frames:
+        groups = [kind.parts for kind in file.frames.values()]
+    parts = [part for group in groups for part in group.values() if part.told == "payload"]
+    sizes = [part.size for part in parts if part.size]
+    if not sizes:
+        return 0, MAX_PAYLOAD
+    return min(low for low, _ in sizes), max(high for _, high in sizes)
+
+
+def with_payload(specs: Mapping[str, PartSpec]) -> Mapping[str, PartSpec]:
+    """The parts of a kind of frame, with an empty payload before its check values if it has none."""
+    if any(spec.told == "payload" for spec in specs.values()):
+        return specs
+    name = "payload"
+    while name in specs:
+        name += "_"
+    names = list(specs)
+    at = 1 + max(
+        (index for index, each in enumerate(names) if specs[each].told not in ("constant", "checksum")),
+        default=0,
     )
+    payload = PartSpec.model_validate({"role": "payload", "size": 0})
+    return {**{each: specs[each] for each in names[:at]}, name: payload, **{e: specs[e] for e in names[at:]}}
 
 
 def _main_check(specs: Mapping[str, PartSpec]) -> str:
@@ -62,8 +82,20 @@ class FrameBuilder:
             self._report.taint(("frame",))
         return frame
 
+    def kind(self, name: str, spec: KindSpec) -> DelimitedFrame | None:
+        """One of several kinds of frame; None after an error that prevents building it."""
+        frame = self._delimited(spec, with_payload(spec.parts), ("frames", name, "parts"))
+        if frame is None:
+            self._report.taint(("frames", name))
+        return frame
+
     def _build(self) -> Frame | None:
         spec = self._file.frame
+        if "frame" not in self._file.model_fields_set:
+            what = "key 'frame' is missing"
+            hint = "frame: the frame around each message; or frames: kinds of frame by name"
+            self._report.error("missing-key", (), what, hint, of_key=True, absent=True)
+            return None
         given = [key for key in _KINDS if getattr(spec, key) is not None]
         if len(given) != 1:
             what = (
@@ -91,13 +123,14 @@ class FrameBuilder:
                 what = "'if' applies only to frames of parts"
                 self._parts.fault("not-applicable", ("frame", *place, "if"), what, "remove it")
         if spec.parts is not None:
-            return self._delimited(spec.parts)
+            return self._delimited(spec, spec.parts, ("frame", "parts"))
         return self._marked(spec.marked) if spec.marked is not None else self._packet(spec.packet or {})
 
     # Parts in wire order
 
-    def _delimited(self, specs: Mapping[str, PartSpec]) -> DelimitedFrame | None:
-        path: Path = ("frame", "parts")
+    def _delimited(
+        self, spec: FrameSpec | KindSpec, specs: Mapping[str, PartSpec], path: Path
+    ) -> DelimitedFrame | None:
         if not self._parts.roles_fit(specs, ("payload",), path):
             return None
         idle = next((name for name, part in specs.items() if part.told == "idle"), "")
@@ -107,14 +140,14 @@ class FrameBuilder:
         main = _main_check(specs)
         parts = placed(
             tuple(
-                (self._parts if name == main else self._others).build(name, spec, specs, (*path, name))
-                for name, spec in specs.items()
+                (self._parts if name == main else self._others).build(name, part, specs, (*path, name))
+                for name, part in specs.items()
             )
         )
-        spec = self._file.frame
-        stuffing = build_stuffing(spec.stuffing, parts, self._parts, self._report) if spec.stuffing else None
+        stuffed, coded_as = (spec.stuffing, spec.coding) if isinstance(spec, FrameSpec) else (None, None)
+        stuffing = build_stuffing(stuffed, parts, self._parts, self._report) if stuffed else None
         codings = CodingBuilder(parts, self._parts, self._report)
-        coding, coded = codings.build(spec.coding)
+        coding, coded = codings.build(coded_as)
         whole = DelimitedFrame(parts, stuffing, coding, coded, silence, spec.doc, spec.section)
         if not all(self._fits(whole.towards(each), path) for each in whole.ways):
             return None

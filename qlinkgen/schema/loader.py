@@ -9,6 +9,7 @@ from pathlib import Path as FilePath
 
 from qlinkgen._resources import library_dir, schemas_dir
 from qlinkgen.errors import Fault, SchemaError
+from qlinkgen.model.frame import Frame, FrameKinds
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.schema.addresses import check_addresses
 from qlinkgen.schema.asked import check_told
@@ -16,9 +17,10 @@ from qlinkgen.schema.commands import CommandBuilder, build_bus
 from qlinkgen.schema.echoes import check_echoes
 from qlinkgen.schema.examples import build_examples
 from qlinkgen.schema.fields import FieldBuilder
+from qlinkgen.schema.frame_kinds import build_kinds, check_kind_names, check_used
 from qlinkgen.schema.frames import FrameBuilder, payload_bounds
 from qlinkgen.schema.including import include
-from qlinkgen.schema.messages import MessageBuilder
+from qlinkgen.schema.kind_messages import message_builder
 from qlinkgen.schema.names import check_names
 from qlinkgen.schema.notation import Version
 from qlinkgen.schema.notation import version as as_version
@@ -149,16 +151,19 @@ def _build(
     text += f"\nversion {version}" if version else ""
     payload_max = payload_bounds(file)[1]
     types = TypeBuilder(file, report, payload_max)
-    frame = FrameBuilder(file, report, types, crc).build()
+    frames = FrameBuilder(file, report, types, crc)
+    frame: Frame | None = build_kinds(file, frames, report) if file.frames else frames.build()
+    check_kind_names(file, report)
     bus = build_bus(file, report)
     check_types(file, report)
     check_references(file, report, frame)
     check_addresses(frame, bus, report)
-    fields = FieldBuilder(file, report, types, payload_max)
-    fields.check_records()
-    messages = MessageBuilder(file, report, fields, frame, bus)
+    FieldBuilder(file, report, types, payload_max).check_records()
+    messages = message_builder(file, report, types, frame, bus)
     commands = CommandBuilder(file, report, messages, frame, bus)
     commands.build()
+    if isinstance(frame, FrameKinds):
+        check_used(frame, commands.messages, report)
     check_echoes(file, commands.commands, messages.places, report)
     check_terminator(frame, commands.messages, report)
     types.report_unused()

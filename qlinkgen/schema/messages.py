@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from typing import Literal, NamedTuple, assert_never
 
 from qlinkgen.model.fields import Field, Record, Records
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame, PartBits
+from qlinkgen.model.frame import DelimitedFrame, MarkedFrame, OneFrame, PacketFrame, PartBits
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.transaction import Addressing, Bus
 from qlinkgen.model.types import Array, Bits, Blob, Chunk, Scalar
@@ -38,6 +38,8 @@ class Written(NamedTuple):
         asked: those with a number of items from the request.
         separator: the byte between them, None if it is that of the defaults.
         way: the value of the direction, if it is not that of a request or a response.
+        kind: the kind of its frame, None if nothing names one.
+        inherited: its number is that of its request.
     """
 
     part: str
@@ -48,15 +50,28 @@ class Written(NamedTuple):
     asked: Collection[str] = ()
     separator: bytes | None = None
     way: str = ""
+    kind: str | None = None
+    inherited: bool = False
 
 
 class MessageBuilder:
     """Builds messages and checks each against the frame."""
 
     def __init__(
-        self, file: SchemaFile, report: Reporter, fields: FieldBuilder, frame: Frame | None, bus: Bus
+        self,
+        file: SchemaFile,
+        report: Reporter,
+        fields: FieldBuilder,
+        frame: OneFrame | None,
+        bus: Bus,
+        *,
+        base: int = 0,
     ) -> None:
-        """``frame`` is None if it could not be built; checks that depend on it are skipped."""
+        """``frame`` is None if it could not be built; checks that depend on it are skipped.
+
+        ``base`` is added to the numbers of messages, see `FrameKinds`.
+        """
+        self._base = base
         self._file = file
         self._report = report
         self._fields = fields
@@ -173,8 +188,9 @@ class MessageBuilder:
     def _number(self, layout: Written, direction: Direction, name: str) -> int:
         path, command = layout.number_path, name.partition(".")[0]
         usual = path in (("commands", command, "id"), ("messages", name, "id"))
+        stated = StatedId(None) if layout.inherited and not self._ids.identifies else layout.number
         whose = "" if usual else name
-        return self._ids.number(layout.number, direction, path, whose, way=layout.way)
+        return self._base + self._ids.number(stated, direction, path, whose, way=layout.way)
 
     def _add(self, message: Message, layout: Written) -> None:
         self.places[message.name] = layout.path
@@ -243,7 +259,7 @@ class MessageBuilder:
     ) -> tuple[tuple[tuple[int, int], ...], int]:
         """Ranges of legal addresses of a message, and its default address."""
         nodes, broadcast = self._bus.nodes, self._bus.broadcast
-        if addressing == "none" or nodes is None:
+        if addressing == "none" or nodes is None or not self.addressed:
             return (), 0
         everybody = (broadcast, broadcast) if broadcast is not None else nodes
         if direction == "response" or addressing == "node":

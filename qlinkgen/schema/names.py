@@ -12,6 +12,7 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.naming import snake, upper
 from qlinkgen.model.types import Array, Blob, Scalar
 from qlinkgen.schema.file_fields import Fields, RecordSpec
+from qlinkgen.schema.file_frames import PartSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import NAME_PATTERN
 from qlinkgen.schema.layouts import layouts, own_steps
@@ -108,15 +109,21 @@ class _Checker:
     def parts(self, file: SchemaFile) -> str | None:
         """Check the names of the parts of a frame; return the name of the address."""
         address = "address" if file.frame.marked is not None else None
-        for group in ("parts", "packet"):
-            for name, part in (getattr(file.frame, group) or {}).items():
-                self.spelling(name, ("frame", group, name))
+        groups: list[tuple[Path, Mapping[str, PartSpec]]] = [
+            (("frame", group), getattr(file.frame, group) or {}) for group in ("parts", "packet")
+        ]
+        for kind, spec in file.frames.items():
+            self.spelling(kind, ("frames", kind))
+            groups.append((("frames", kind, "parts"), spec.parts))
+        for path, parts in groups:
+            for name, part in parts.items():
+                self.spelling(name, (*path, name))
                 if part.told == "address":
                     address = name
                 for inner, bits in (part.bits or {}).items():
-                    place = ("frame", group, name, "bits", inner)
+                    place = (*path, name, "bits", inner)
                     self.spelling(inner, place)
-                    if inner in (getattr(file.frame, group) or {}):
+                    if inner in parts:
                         self._error(
                             "name-clash", place, f"{inner} is also a part of the frame", "rename one of them"
                         )

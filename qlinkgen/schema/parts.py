@@ -302,6 +302,8 @@ class PartBuilder:
 
     @staticmethod
     def _parts_path(path: Path) -> Path:
+        if path[0] == "frames":
+            return path[:3]
         return ("frame", "packet" if "packet" in path[:2] else "parts")
 
     # Checksums

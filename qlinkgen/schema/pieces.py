@@ -203,6 +203,11 @@ class IdBuilder:
         by_parts = isinstance(frame, DelimitedFrame) and frame.directed
         self._directed = by_parts or self.direction is not None
 
+    @property
+    def identifies(self) -> bool:
+        """Whether the frame has a message id, apart from its direction; unknown frames do."""
+        return bool(self._pieces) or not isinstance(self._frame, DelimitedFrame)
+
     def number(
         self, stated: StatedId, direction: Direction, path: Path, whose: str = "", *, way: str = ""
     ) -> int:

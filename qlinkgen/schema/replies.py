@@ -11,7 +11,8 @@ from qlinkgen.model.transaction import Addressing, Allowance, Case, Reply
 from qlinkgen.model.types import Enum, Float, Scalar
 from qlinkgen.schema.file_commands import AnswerSpec, Means, MeansSpec, MessageSpec, ReplySpec
 from qlinkgen.schema.file_model import SchemaFile
-from qlinkgen.schema.messages import MessageBuilder, Written
+from qlinkgen.schema.kind_messages import AnyMessages
+from qlinkgen.schema.messages import Written
 from qlinkgen.schema.notation import AnswerId, Duration, shown, whole_range
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
@@ -77,7 +78,7 @@ class ReplyBuilder:
     """Checks what replies mean, and builds them."""
 
     def __init__(
-        self, file: SchemaFile, report: Reporter, messages: MessageBuilder, frame: Frame | None
+        self, file: SchemaFile, report: Reporter, messages: AnyMessages, frame: Frame | None
     ) -> None:
         """``frame`` is None if it could not be built; checks that depend on it are skipped."""
         self._file = file
@@ -134,6 +135,8 @@ class ReplyBuilder:
             fields,
             separator=spec.separator,
             way=self._way(written),
+            kind=self._kind(command, written),
+            inherited=spec.id is None,
         )
         owner = "" if written.shared else command
         message = self._messages.reply(owner, written.spec, layout, addressing=addressing)
@@ -161,6 +164,17 @@ class ReplyBuilder:
             self._report.error(_RULE, place, what, hint, needs=needs)
         self._report.taint(written.path)
         return ""
+
+    def _kind(self, command: str, written: OfCommand) -> str | None:
+        """The kind of frame of a reply: the nearest that is stated."""
+        own, common = self._file.commands[command], self._file.defaults.response
+        stated = (
+            written.spec.frame,
+            None if written.shared else own.frame,
+            common.frame if isinstance(common, AnswerSpec) else None,
+            self._file.defaults.frame,
+        )
+        return next((kind for kind in stated if kind is not None), None)
 
     def outcome(self, command: str, response: Message | None) -> Reply | None:
         """What the response of a command means, None if it always answers the request."""

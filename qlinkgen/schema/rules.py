@@ -202,6 +202,19 @@ _ALL = (
         "See the schema reference: parts, marked or packet.",
     ),
     Rule(
+        "bad-kinds",
+        "Kinds of frame begin with constants that tell them apart, and each message knows its kind.",
+        "A receiver tries each kind where one may begin. Kinds have no terminator, idle line, stuffing, "
+        "coding, trim, blocks, seeds or values of every frame. A message without frame travels in the kinds "
+        "that no message names, which then have the same parts except constants, lengths and check values; "
+        "the shortest one that fits is sent.",
+    ),
+    Rule(
+        "short-frame",
+        "A frame of one or two bytes without a check value is an answer.",
+        "Noise contains every byte. Who waits for an answer knows when one may come.",
+    ),
+    Rule(
         "unknown-part",
         "Length, checksum and stuffing name parts of the frame.",
         "The name does not refer to a part of this frame.",

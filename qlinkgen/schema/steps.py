@@ -11,8 +11,9 @@ from qlinkgen.model.transaction import Addressing, Allowance, Step
 from qlinkgen.schema.file_commands import CommandSpec, StepMessageSpec, StepSpec
 from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.file_model import SchemaFile
+from qlinkgen.schema.kind_messages import AnyMessages
 from qlinkgen.schema.layouts import OwnStep, own_steps
-from qlinkgen.schema.messages import MessageBuilder, Written
+from qlinkgen.schema.messages import Written
 from qlinkgen.schema.notation import AnswerId, shown
 from qlinkgen.schema.replies import written_replies
 from qlinkgen.schema.report import Reporter, did_you_mean
@@ -69,7 +70,7 @@ class StepBuilder:
         self,
         file: SchemaFile,
         report: Reporter,
-        messages: MessageBuilder,
+        messages: AnyMessages,
         singles: Mapping[str, Message],
         sizes: dict[str, tuple[tuple[str, str], ...]],
     ) -> None:
@@ -121,7 +122,7 @@ class StepBuilder:
                 "use kind: master_slave",
             ),
             "frame": (
-                self._file.frame.parts is None,
+                self._file.frame.parts is None and not self._file.frames,
                 "its frame has no parts",
                 "describe a frame with parts",
             ),
@@ -187,9 +188,17 @@ class StepBuilder:
             found = sized(fields, asked.request, step.fields_path, self._report)
             fields, self._sizes[asked.name] = found
         items = {name for name, _ in self._sizes.get(asked.name, ()) if step.last}
-        separator = asked.spec.separator
+        stated = step.message.frame if isinstance(step.message, StepMessageSpec) else None
         layout = Written(
-            step.name, number.of(asked.spec.id), place, fields, step.fields_path, items, separator
+            step.name,
+            number.of(asked.spec.id),
+            place,
+            fields,
+            step.fields_path,
+            items,
+            asked.spec.separator,
+            kind=stated or asked.spec.frame or self._file.defaults.frame,
+            inherited=number.relative,
         )
         direction: Literal["request", "response"] = "request" if sent else "response"
         return self._messages.reply(

@@ -56,6 +56,10 @@ def _frame_facts(file: SchemaFile) -> Iterator[tuple[Path, str, Fact]]:
     for group in ("parts", "packet"):
         for name, part in (getattr(file.frame, group) or {}).items():
             yield ("frame", group, name), f"{name} of the frame", part
+    for kind, spec in file.frames.items():
+        yield ("frames", kind), f"the frame {kind}", spec
+        for name, part in spec.parts.items():
+            yield ("frames", kind, "parts", name), f"{name} of the frame {kind}", part
     if file.frame.marked and file.frame.marked.checksum:
         yield ("frame", "marked", "checksum"), "the checksum of the frame", file.frame.marked.checksum
 

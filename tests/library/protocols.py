@@ -38,6 +38,7 @@ PEERS: Mapping[str, tuple[str, str]] = {
     "dynamixel_2": ("dynamixel_sdk", "dynamixel-sdk"),
     "mavlink_1": ("pymavlink", "pymavlink"),
     "mavlink_2": ("pymavlink", "pymavlink"),
+    "mbus": ("meterbus", "pyMeterBus"),
     "modbus_ascii": ("pymodbus", "pymodbus"),
     "modbus_rtu": ("pymodbus", "pymodbus"),
     "msp": ("yamspy", "yamspy"),

@@ -29,7 +29,7 @@ def rules(text: str) -> list[str]:
         ("crc-8/smbus", "crc-8/smbas", "unknown-algorithm"),
         ("over: [length, kind,", "over: [length, kin,", "unknown-part"),
         ("counts: [payload]", "counts: {payload: 1}", "wrong-type"),
-        ("\nframe:", "\nframes:", "unknown-key"),
+        ("\nframe:", "\nfram:", "unknown-key"),
         # Addresses and transactions.
         ("nodes: 1..31", "nodes: 31..1", "bad-value"),
         ("broadcast: 0", "broadcast: none", "wrong-type"),

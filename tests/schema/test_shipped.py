@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from qlinkgen.model.frame import DelimitedFrame, MarkedFrame, PacketFrame
+from qlinkgen.model.frame import DelimitedFrame, FrameKinds, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Scalar
@@ -114,6 +114,7 @@ def test_only_warnings_of_unconfirmed_facts() -> None:
 
 def test_everything_has_a_section_and_a_text(protocol: Protocol) -> None:
     assert protocol.bus.section
+    assert not isinstance(protocol.frame, FrameKinds)
     assert protocol.frame.section
     named: tuple[Enum | Flags, ...] = (*protocol.enums, *protocol.flags)
     for each in named:

@@ -13,7 +13,7 @@ from pathlib import Path
 from qlinkgen.backends import c
 from qlinkgen.backends.base import Options
 from qlinkgen.backends.c.names import Names
-from qlinkgen.model.frame import DelimitedFrame, Frame
+from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob
@@ -193,9 +193,16 @@ def shrunk(protocol: Protocol, most: int) -> Protocol:
 
 def _cut_frame(frame: Frame, most: int) -> Frame:
     if isinstance(frame, DelimitedFrame):
-        parts = tuple(replace(p, max_size=most) if p.role == "payload" else p for p in frame.parts)
-        return replace(frame, parts=parts)
+        return _cut_parts(frame, most)
+    if isinstance(frame, FrameKinds):
+        kinds = (replace(each, frame=_cut_parts(each.frame, most)) for each in frame.kinds)
+        return replace(frame, kinds=tuple(kinds))
     return replace(frame, payload_max=most)
+
+
+def _cut_parts(frame: DelimitedFrame, most: int) -> DelimitedFrame:
+    parts = tuple(replace(p, max_size=most) if p.role == "payload" else p for p in frame.parts)
+    return replace(frame, parts=parts)
 
 
 def _cut(message: Message, most: int) -> Message:

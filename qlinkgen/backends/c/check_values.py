@@ -86,7 +86,10 @@ class CheckWriter(Places):
 
     def covered_loops(self, array: str, start: str, payload_end: str) -> list[str]:
         """Loops that update the only check value with the covered bytes of an array."""
-        return self._loops(self.alone, "check", array, start, payload_end) if self.alone else []
+        if self.alone is None:
+            return []
+        key = self.algorithms[self.alone.check.algorithm].key
+        return self._loops(self.alone, key, array, start, payload_end)
 
     def _loops(
         self, check: CheckPart, key: str, array: str, start: str, payload_end: str, *, lead: bool = False

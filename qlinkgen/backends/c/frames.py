@@ -9,6 +9,7 @@ from typing import assert_never
 from qlinkgen.backends.c import crc, framing
 from qlinkgen.backends.c.checks import condition
 from qlinkgen.backends.c.coding import EndedView
+from qlinkgen.backends.c.kinds import KindsView, kinds_views
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.marked import PLACE, MarkedView, Shapes, marked_view, shape
 from qlinkgen.backends.c.names import Names
@@ -45,6 +46,7 @@ ReceivedMessages = Sequence[tuple[Direction, Sequence[MessagePlan]]]
 #: Views of the templates of one kind of frame, in addition to `FrameView`.
 View = (
     PlaceView
+    | KindsView
     | PartsView
     | PlainView
     | StuffedView
@@ -107,18 +109,18 @@ class FrameSection:
     @property
     def seeded(self) -> bool:
         """Whether check values cover attributes of messages."""
-        return bool(self.plan.frame.envelope.seeded)
+        return any(each.envelope.seeded for each in self.plan.frame.every)
 
     @property
     def request_sum(self) -> str:
         """C type of the contribution of a request to the check value of its response, "" if there is none."""
-        check = self.plan.frame.check
+        check = self.plan.frame.check if self.slave_only else None
         return sum_type(check) if self.slave_only and check else ""
 
     @property
     def reject(self) -> str:
         """The function that makes the response to an unknown request, "" if there is none."""
-        check = self.plan.frame.check
+        check = self.plan.frame.check if self.slave_only else None
         return f"{self.plan.protocol.name}_reject_" if check and check.rejected is not None else ""
 
     def received(self) -> ReceivedMessages:
@@ -197,13 +199,23 @@ def _common(plan: Plan, ways: Mapping[str, PartsViews]) -> PartsViews:
 
 def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
     """Choose by the way frames are received."""
+    if plan.frame.kinds:
+        several = kinds_views(plan, layouts)
+        found: Mapping[str, View] = {
+            "kinds": several.kinds,
+            "parts": several.parts,
+            "ended": None,
+            "inserted": None,
+        }
+        templates: tuple[str, ...] = ("kinds", "wrap", "frame_public")
+        return FrameSection(plan, several.f, found, several.algorithms, templates, "receiver_rescan")
     receiver, check = plan.frame.receiver, plan.frame.check
     match receiver:
         case Hunt() | Rescan():
             ways = parts_views(plan, layouts)
             views = _common(plan, ways) if plan.directed else ways[""]
             frame = "frame_stuffed" if views.stuffed else "frame_plain"
-            templates: tuple[str, ...] = ("place", "values", frame, "wrap", "frame_public")
+            templates = ("place", "values", frame, "wrap", "frame_public")
             if views.ended:
                 made = ("coding", "wrap_coded") if views.ended.stages else ("frame_plain",)
                 templates = ("place", "values", *made, "scan_ended", "wrap", "frame_public")

@@ -205,4 +205,5 @@ def address_of(plan: Plan, name: str, direction: Direction = "response") -> Addr
         for test in refused_when_received(each.number, f"frame->parts.{member(each.name)}")
     ]
     kind = f"{plan.protocol.name}_parts_t" if envelope.values else ""
-    return Address(name, envelope.address[0].bits if envelope.address else 8, kind, tuple(refused))
+    sizes = [bits.bits for each in plan.frames[direction].every for bits in each.envelope.address[:1]]
+    return Address(name, sizes[0] if sizes else 8, kind, tuple(refused))

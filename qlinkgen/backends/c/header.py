@@ -21,7 +21,7 @@ from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.messages import Beside, MessageWriter, Rounding, nearest_helpers
 from qlinkgen.backends.c.names import Names
 from qlinkgen.backends.c.places import in_hex
-from qlinkgen.backends.c.sizes import SizeView, size_view
+from qlinkgen.backends.c.sizes import SizeView, size_view, sized_by_message
 from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.backends.c.types import Kind, Types
 from qlinkgen.backends.c.views import FrameView, own_prefix
@@ -197,7 +197,9 @@ class Header:
             texts.append(self._place("seeds", f=view, seeds=seeds, known=known, unused=unused))
         if view.sized_by_message:
             size_groups = [
-                Group(d, [size_view(names, message, self._layouts) for message in messages])
+                Group(
+                    d, [size_view(names, each, self._layouts) for each in messages if sized_by_message(each)]
+                )
                 for d, messages in received
             ]
             texts.append(self._place("payload_size", f=view, size_groups=size_groups, unused=unused))
@@ -314,13 +316,19 @@ class Header:
             enums=enum_views(protocol, self._names),
             helpers=self._layouts.helpers(),
             has_text=any(run.text for run in runs),
-            has_bytes=bool(runs) or self._plan.frame.envelope.payload.trim is not None,
+            has_bytes=bool(runs) or self._copies,
             has_table=isinstance(check, CrcView),
             extended=sorted(self._layouts.extended),
             floats=self._floats(),
             nearest=nearest_helpers(self._types, self._plan.messages),
             types=list(self._types.named.values()),
         )
+
+    @property
+    def _copies(self) -> bool:
+        """Whether wrapping a frame copies its payload."""
+        frame = self._plan.frame
+        return bool(frame.kinds) or frame.envelope.payload.trim is not None
 
     def _floats(self) -> list[str]:
         """The types of floating-point numbers in use; f16 is converted by way of f32."""

@@ -44,6 +44,8 @@ class Sender:
 
 def sender_of(frame: FramePlan, prefix: str) -> Sender:
     """The sender of a frame; names are "id" and that of the address, changed if taken."""
+    if frame.kinds:
+        return _sender_of_kinds(frame)
     envelope = frame.envelope
     address = address_member(frame.address)
     address_type = unsigned_type(envelope.address[0].bits if envelope.address else 8)
@@ -53,6 +55,25 @@ def sender_of(frame: FramePlan, prefix: str) -> Sender:
         address,
         address_type if address else "",
         f"{prefix}_parts_t" if envelope.values else "",
+    )
+
+
+def id_bits(frame: FramePlan) -> int:
+    """Bits of a message number, above it that of the family of kinds."""
+    numbers = ((each.base, sum(bits.bits for bits in each.envelope.id)) for each in frame.every)
+    return max((base | (1 << size) - 1).bit_length() for base, size in numbers) or 8
+
+
+def _sender_of_kinds(frame: FramePlan) -> Sender:
+    """Several kinds have the address of any of them."""
+    address = address_member(frame.address)
+    sizes = [bits.bits for kind in frame.kinds for bits in kind.envelope.address[:1]]
+    return Sender(
+        address_member(frame.id_name) if address == "id" else "id",
+        unsigned_type(id_bits(frame)),
+        address,
+        unsigned_type(sizes[0]) if sizes else "",
+        "",
     )
 
 

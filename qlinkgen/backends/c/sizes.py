@@ -11,10 +11,16 @@ from qlinkgen.backends.c.members import count_of
 from qlinkgen.backends.c.names import Names, grouped
 from qlinkgen.backends.c.walked_size import walked_size_lines
 from qlinkgen.model.message import Message
+from qlinkgen.plan.ends import ByMessage
 from qlinkgen.plan.expr import Size, Term, Within
 from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan, Place
 from qlinkgen.plan.planning import payload_plan
 from qlinkgen.plan.tree import MessagePlan
+
+
+def sized_by_message(message: MessagePlan) -> bool:
+    """Whether a receiver derives the size of its payload from its counts."""
+    return any(isinstance(each.end, ByMessage) for each in message.frames)
 
 
 def size_text(size: Size, count: Callable[[str], str]) -> str:

@@ -14,7 +14,7 @@ from qlinkgen.backends.c.crc import CheckView
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned_type
 from qlinkgen.backends.c.parts import PartWriter, length_bounds
-from qlinkgen.backends.c.places import in_hex, sender_of
+from qlinkgen.backends.c.places import id_bits, in_hex, sender_of
 from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.ends import ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.framing import FramePlan
@@ -37,6 +37,7 @@ class FrameView:
 
     id: str
     id_type: str
+    id_bits: int
     address: str
     address_type: str
     identity: str
@@ -76,27 +77,29 @@ def frame_view(
     frame = frame or plan.frame
     prefix, receiver = plan.protocol.name, frame.receiver
     sender = sender_of(frame, prefix)
-    ring, directed = plan.protocol.directions == ("message",), _directed(plan)
+    ring, known = plan.protocol.directions == ("message",), directed(plan)
     answered = "request_check" if isinstance(receiver, InStep) else "request_check or _response_check"
     return FrameView(
         id=sender.id,
         id_type=sender.id_type,
+        id_bits=id_bits(plan.frame),
         address=sender.address,
         address_type=sender.address_type,
         identity=sender.identity,
         parameters=sender.parameters,
         arguments=sender.arguments,
         has_values=bool(sender.values_type),
-        needs_direction=directed,
-        scan_direction=f"{prefix}_direction_t direction, " if directed else "",
-        init_direction=f", {prefix}_direction_t direction" if directed else "",
-        pass_direction="receiver->direction, " if directed else "",
-        pass_decode_direction="direction, " if directed else "",
-        direction_unused=directed and not _uses_direction(frame),
+        needs_direction=known,
+        scan_direction=f"{prefix}_direction_t direction, " if known else "",
+        init_direction=f", {prefix}_direction_t direction" if known else "",
+        pass_direction="receiver->direction, " if known else "",
+        pass_decode_direction="direction, " if known else "",
+        direction_unused=known and not _uses_direction(frame),
         check_name="message_check" if ring else answered,
         bare=isinstance(receiver, Rescan) and receiver.bare,
         checks_header=frame.checks_header,
-        sized_by_message=isinstance(receiver, Hunt | Rescan) and isinstance(frame.end, ByMessage),
+        sized_by_message=isinstance(receiver, Hunt | Rescan)
+        and any(isinstance(each.end, ByMessage) for each in frame.every),
         body_size=body_size,
         check_optional=check_optional,
         max_wire=max_wire,
@@ -113,7 +116,7 @@ def _idle(plan: Plan) -> tuple[int, int] | None:
     return bits, math.ceil(silence.seconds * 1_000_000)
 
 
-def _directed(plan: Plan) -> bool:
+def directed(plan: Plan) -> bool:
     """Whether a receiver needs the direction to find the end of a frame or to validate it."""
     receiver = plan.frame.receiver
     match receiver:
@@ -130,7 +133,7 @@ def _directed(plan: Plan) -> bool:
 
 def _uses_direction(frame: FramePlan) -> bool:
     """Whether a function that finds a frame in bytes depends on its direction."""
-    by_message, receiver = isinstance(frame.end, ByMessage), frame.receiver
+    by_message, receiver = any(isinstance(each.end, ByMessage) for each in frame.every), frame.receiver
     return frame.checks_header or by_message or (isinstance(receiver, Rescan) and receiver.seeded)
 
 
@@ -150,7 +153,7 @@ class PartsView:
 
     Attributes:
         late_insert: an inserted byte may follow the last byte.
-        judged: without a check value, only valid contents confirm a frame.
+        judged: without a check value, only valid contents confirm a frame; the condition, "" if there is one.
         values: functions for check values, none if the only one is computed in passing.
         judges: statements that verify them.
         inline: the only check value is computed in passing.
@@ -161,7 +164,7 @@ class PartsView:
     """
 
     late_insert: bool
-    judged: bool
+    judged: str
     head: int
     tail: int
     header: int
@@ -306,10 +309,10 @@ def parts_views(whole: Plan, layouts: Layouts) -> dict[str, PartsViews]:
 def _parts_views(whole: Plan, plan: Plan, way: str, layouts: Layouts) -> PartsViews:
     seeds = plan.messages[0].message.seeds if plan.messages else ()
     sender = sender_of(plan.frame, plan.protocol.name)
-    prefix, directed = plan.protocol.name, _directed(whole)
+    prefix, passes = plan.protocol.name, directed(whole)
     every = (whole.frame.envelope, *([whole.frames["request"].envelope] if way else []))
     own = own_prefix(prefix, way)
-    writer = PartWriter(prefix, plan.frame, sender, layouts, seeds, directed, own, every)
+    writer = PartWriter(prefix, plan.frame, sender, layouts, seeds, passes, own, every)
     envelope, receiver, transparency = plan.frame.envelope, plan.frame.receiver, plan.frame.transparency
     rule, body_size = None, 0
     match transparency:
@@ -338,8 +341,8 @@ def _parts_views(whole: Plan, plan: Plan, way: str, layouts: Layouts) -> PartsVi
             header=envelope.header_size,
             overhead=envelope.overhead,
         ),
-        parts=_parts(writer, plan.frame.max_wire),
-        plain=None if stuffing else _plain(writer, passed),
+        parts=parts_view(writer, plan.frame.max_wire),
+        plain=None if stuffing else plain_view(writer, passed),
         stuffed=_stuffed(writer, stuffing, passed) if stuffing else None,
         inserted=_inserted(rule) if rule else None,
         hunt=_hunted(writer, receiver) if isinstance(receiver, Hunt) else None,
@@ -347,11 +350,12 @@ def _parts_views(whole: Plan, plan: Plan, way: str, layouts: Layouts) -> PartsVi
     )
 
 
-def _parts(writer: PartWriter, max_wire: int) -> PartsView:
+def parts_view(writer: PartWriter, max_wire: int) -> PartsView:
+    """The view of the parts of a frame."""
     envelope, receiver, stuffing = writer.envelope, writer.frame.receiver, writer.stuffing
     return PartsView(
         late_insert=isinstance(receiver, Rescan) and stuffing is not None and not stuffing.back,
-        judged=isinstance(receiver, Rescan) and not receiver.verified,
+        judged="true" if isinstance(receiver, Rescan) and not receiver.verified else "",
         head=writer.head,
         tail=envelope.trailer_size,
         header=envelope.header_size,
@@ -373,7 +377,8 @@ def _parts(writer: PartWriter, max_wire: int) -> PartsView:
     )
 
 
-def _plain(writer: PartWriter, directed: str) -> PlainView:
+def plain_view(writer: PartWriter, directed: str) -> PlainView:
+    """The view of a frame whose header is sent unstuffed."""
     header, received = writer.envelope.header_size, "sent" if writer.blocks else "payload"
     return PlainView(
         put_header=writer.put_header("wire", "size" if writer.blocks else "sent"),

@@ -39,16 +39,20 @@ class Stream:
 
 def noise(plan: Plan) -> tuple[bytes, ...]:
     """Noise between frames: bytes that do not begin a frame, or begin one without completing it."""
-    envelope, strategy = plan.frames[plan.received_directions[0]].envelope, plan.frame.receiver
+    strategy, direction = plan.frame.receiver, plan.received_directions[0]
+    envelopes = [each.envelope for each in plan.frames[direction].every]
     match strategy:
         case Hunt() | Rescan():
-            preamble = envelope.preamble
-            return tuple(dict.fromkeys((b"\x00\xff", preamble[:1], b"", preamble + b"\x00")))
+            # One byte more must not complete a frame.
+            long = [each for each in envelopes if len(envelopes) == 1 or each.overhead > each.header_size + 1]
+            preambles = [each.preamble for each in long]
+            begun = [each + b"\x00" for each in preambles]
+            return tuple(dict.fromkeys((b"\x00\xff", *(each[:1] for each in preambles), b"", *begun)))
         case Marks():
-            header = envelope.front[0]
+            header = envelopes[0].front[0]
             assert isinstance(header, MarkPart)
-            begun = header.byte(plan.messages[0].id, header.address.mask & 1)
-            return bytes((header.marker ^ 0xFF,)), b"", bytes((begun,))
+            first = header.byte(plan.messages[0].id, header.address.mask & 1)
+            return bytes((header.marker ^ 0xFF,)), b"", bytes((first,))
         case InStep():
             ids = {message.id for message in plan.protocol.messages}
             return bytes((next((number for number in range(0xFF, -1, -1) if number not in ids), 0),)), b""

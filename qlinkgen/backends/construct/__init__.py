@@ -39,6 +39,7 @@ _SUPPORT = {
     "_fasked": "Asked Told",
     "_frecords": "Record",
     "_ftexts": "BetweenField Separated TextNumber",
+    "_kinds": "Kind Kinds",
     "_ftrimmed": "Trimmed",
     "_fwalks": "TerminatedText Walked",
 }

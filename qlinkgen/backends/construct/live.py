@@ -55,6 +55,7 @@ def live(protocol: Protocol, options: Options | None = None) -> Live:
         "_packed",
         "_ended",
         "_fasked",
+        "_kinds",
     )
     modules = ("construct", *(f"{__package__}.{name}" for name in own))
     names: dict[str, Value] = {"Decimal": Decimal, "float": float}

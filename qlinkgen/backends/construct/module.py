@@ -8,7 +8,9 @@ from typing import assert_never
 from qlinkgen.backends.construct.payload import Names, Types, beside, comment, fields, integer, record
 from qlinkgen.backends.construct.tree import Call, Definition, Node, Ref, Sequence, hexadecimal
 from qlinkgen.model import checksum as catalogue
+from qlinkgen.model.frame import FrameKinds
 from qlinkgen.model.integer import Integer
+from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import record_key
 from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
 from qlinkgen.plan.ends import ByTerminator, Hunt, InStep, Marks, Rescan
@@ -59,7 +61,8 @@ def definitions(plan: Plan) -> tuple[Definition, ...]:
 
 
 def _definitions(plan: Plan) -> Iterator[Definition]:
-    names = Names(_OWN_NAMES)
+    layouts = [_kind_layout(each) for each in plan.frame.kinds]
+    names = Names((*_OWN_NAMES, *layouts))
     stated = plan.protocol
     labelled = [each.name for each in stated.enums] + [each.name for each in stated.flags]
     groups = {name: names.of(name, "TYPE") for name in labelled}
@@ -144,23 +147,22 @@ def _choices(payload: PayloadPlan) -> Iterator[Node]:
 
 
 def _frames(plan: Plan, messages: Mapping[str, str], types: Types) -> Iterator[Definition]:
-    frame = plan.frame
     algorithms = _algorithms(plan)
     for algorithm, name in algorithms.items():
         yield Definition(name, _algorithm(algorithm), algorithm.name)
-    stated = plan.protocol.frame
-    said = comment(stated.doc, stated.section)
-    for way, each in plan.ways.items() if not frame.needs_request else ():
-        yield Definition(_layout_name(way), _layout(each.frame.envelope, types, algorithms), said)
+    yield from _layouts(plan, types, algorithms)
     frames = []
     for direction in plan.protocol.directions:
         name = "FRAME" if direction == "message" else f"{direction.upper()}_FRAME"
         frame = plan.frames[direction]
+        frames.append(Ref(name))
+        if frame.kinds:
+            yield Definition(name, _kinds(plan, direction, messages))
+            continue
         layout: Node = Ref(_layout_name(direction if plan.directed else ""))
         if frame.needs_request:
             layout = _layout(frame.envelope, types, algorithms)
         chosen = Sequence(tuple(Ref(messages[each.name]) for each in plan.received(direction)))
-        frames.append(Ref(name))
         made = _frame(frame, layout, chosen)
         if direction == "response" and plan.carrier is not None:
             made = Call("Told", (made, *frames[:-1], *_asked(plan, messages)))
@@ -174,14 +176,45 @@ def _asked(plan: Plan, messages: Mapping[str, str]) -> Iterator[Node]:
         yield Call("Asked", (request, *(Ref(messages[each.name]) for each in answers)))
 
 
+def _layouts(plan: Plan, types: Types, algorithms: Algorithms) -> Iterator[Definition]:
+    """The parts of frames, of each kind or direction that has its own."""
+    stated = plan.protocol.frame
+    if isinstance(stated, FrameKinds):
+        for kind, described in zip(plan.frame.kinds, stated.kinds, strict=True):
+            said = comment(described.frame.doc, described.frame.section)
+            yield Definition(_kind_layout(kind), _layout(kind.envelope, types, algorithms), said)
+        return
+    said = comment(stated.doc, stated.section)
+    for way, each in plan.ways.items() if not plan.frame.needs_request else ():
+        yield Definition(_layout_name(way), _layout(each.frame.envelope, types, algorithms), said)
+
+
 def _layout_name(direction: str) -> str:
     return f"{direction.upper()}_LAYOUT" if direction else "LAYOUT"
+
+
+def _kind_layout(kind: FramePlan) -> str:
+    return f"LAYOUT_{kind.name.upper()}"
+
+
+def _kinds(plan: Plan, direction: Direction, messages: Mapping[str, str]) -> Call:
+    """The kinds of frame of a direction, the shortest first."""
+    calls: list[Node] = []
+    for kind in sorted(plan.frame.kinds, key=lambda each: each.max_payload):
+        carried = [each for each in plan.received(direction) if kind in each.frames]
+        chosen = Sequence(tuple(Ref(messages[each.name]) for each in carried))
+        settings: dict[str, Node] = {"base": hexadecimal(kind.base)} if kind.base else {}
+        settings |= {"least": kind.envelope.payload.least} if kind.envelope.payload.least else {}
+        settings |= {"address": record_key(kind.address)} if kind.address else {}
+        calls.append(Call("Kind", (Ref(_kind_layout(kind)), chosen), tuple(settings.items())))
+    return Call("Kinds", tuple(calls))
 
 
 def _algorithms(plan: Plan) -> Algorithms:
     """The name of each algorithm of frames, the main one first."""
     found = dict[catalogue.Checksum, None]()
-    for envelope in dict.fromkeys((plan.frame.envelope, plan.frames["request"].envelope)):
+    envelopes = [each.envelope for each in (*plan.frame.every, *plan.frames["request"].every)]
+    for envelope in dict.fromkeys(envelopes):
         found |= dict.fromkeys(each.algorithm for each in envelope.algorithms)
     return {
         each: "ALGORITHM" if number == 1 else f"ALGORITHM_{number}" for number, each in enumerate(found, 1)

@@ -23,7 +23,7 @@ from qlinkgen.model.frame import ATTRIBUTE
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import pascal
 from qlinkgen.model.types import Scalar
-from qlinkgen.plan.ends import ByLength, ByMark, ByMessage, ByTerminator
+from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, ByTerminator
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import Seed
 from qlinkgen.plan.payload import (
@@ -167,6 +167,7 @@ class ClassBuilder:
     def _message(self, message: MessagePlan) -> ClassModel:
         facts = [f'NAME = "{message.name}"', f"ID = {in_hex(message.id)}"]
         facts.append(f"MAX_WIRE_SIZE = {message.wire_size}")
+        facts += self._kind(message) if self._plan.frame.kinds else []
         facts += [
             f"{seed_name(Seed(name.removeprefix(ATTRIBUTE)))} = {literal(data)}"
             for name, data in message.message.seeds
@@ -198,25 +199,13 @@ class ClassBuilder:
             init=self._init(message),
             encode=encode,
             decode=decoder.statements(),
-            measure=measure_lines(message.payload) if self._measured and number else [],
+            measure=measure_lines(message.payload) if number and _measured(message) else [],
             constants=[*encoder.constants, *decoder.constants],
             body_size=self._body_size(message),
             has_codec=True,
             walked=any("misplaced(" in line for line in encode),
             way=message.direction if self._plan.directed and place.envelope else "",
         )
-
-    @property
-    def _measured(self) -> bool:
-        """Whether only its counts determine the end of a message."""
-        end = self._plan.frame.end
-        match end:
-            case ByMessage():
-                return True
-            case ByLength() | ByMark() | ByTerminator():
-                return False
-            case _:
-                assert_never(end)
 
     def _body_size(self, message: MessagePlan) -> int | None:
         """Number of bytes that the encoder packs, None if it varies."""
@@ -235,6 +224,12 @@ class ClassBuilder:
         """The constant for a message with a check value, if only some have one."""
         marked = isinstance(self._plan.frame.end, ByMark)
         return ["CHECKED = True"] if marked and not self._all_checked and message.checked else []
+
+    def _kind(self, message: MessagePlan) -> list[str]:
+        """What tells the kind of its frame, and whether that has an address."""
+        base = message.frames[-1].base
+        addressed = message.allowed is not None or not self._place.address
+        return [*([f"FAMILY = {in_hex(base)}"] if base else []), *([] if addressed else ['ADDRESS = ""'])]
 
     # Parts of a class
 
@@ -317,6 +312,18 @@ def _makers(payload: PayloadPlan) -> tuple[type[Encoder], type[Decoder]]:
     return (WalkedEncoder, WalkedDecoder) if payload.walked else (Encoder, Decoder)
 
 
+def _measured(message: MessagePlan) -> bool:
+    """Whether only its counts determine the end of a message."""
+    end = message.frames[-1].end
+    match end:
+        case ByMessage():
+            return True
+        case ByLength() | ByMark() | ByTerminator() | ByKind():
+            return False
+        case _:
+            assert_never(end)
+
+
 def _message_of(layout: Layout) -> MessagePlan:
     """A record as a message without a frame."""
     stated = Message(
@@ -327,6 +334,7 @@ def _message_of(layout: Layout) -> MessagePlan:
     return MessagePlan(
         stated,
         payload,
+        (),
         Envelope(()),
         None,
         payload.most,

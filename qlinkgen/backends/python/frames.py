@@ -461,7 +461,8 @@ def _by_id(messages: Sequence[MessagePlan], attribute: str = "") -> str:
 # Parts of views
 
 
-def _check_view(check: Check, mark: str = "") -> CheckView:
+def check_view(check: Check, mark: str = "") -> CheckView:
+    """The view of a check value."""
     algorithm = check.algorithm
     selectable = isinstance(algorithm, Algorithm) and algorithm.width == 16
     maker, arguments = _algorithm(algorithm)
@@ -583,7 +584,7 @@ def _unique(plan: Plan, receiver: Hunt, title: str, sizes: Sequence[int]) -> Uni
     return UniqueView(
         title=title,
         idle=_idle(plan.frame.idle),
-        check=_check_view(check.check),
+        check=check_view(check.check),
         address=address,
         preamble=literal(envelope.preamble),
         mark=in_hex(receiver.mark),
@@ -646,7 +647,7 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         title=title,
         checks=checks,
         filling=filling,
-        blocks=BlocksView(envelope.blocks.every, _check_view(envelope.blocks.check, "_BLOCKS"))
+        blocks=BlocksView(envelope.blocks.every, check_view(envelope.blocks.check, "_BLOCKS"))
         if envelope.blocks
         else None,
         blank=literal(bytes(last.size)) if isinstance(last, CheckPart) else "",
@@ -860,7 +861,7 @@ def _bare_checks(envelope: Envelope, part: Part, reached: str, no_frame: str) ->
         yield HeadCheck(f"{reached} not _allowed(head, known)", no_frame, "address")
 
 
-def _placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> PlacedCheck:
+def placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> PlacedCheck:
     """The view of a check value."""
     covered = " + ".join(
         f"message.{seed_name(run)}"
@@ -868,7 +869,7 @@ def _placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> P
         else f"frame[{_edge(envelope, run[0])}:{_edge(envelope, run[-1], after=True)}]"
         for run in envelope.coverage(part)
     )
-    view = _check_view(part.check, mark)
+    view = check_view(part.check, mark)
     start, end = _edge(envelope, part), _edge(envelope, part, after=True)
     seeded, main = part in envelope.seeded, part is envelope.check
     checksum = "checksum" if main else f"_CHECKSUM{mark}"
@@ -906,9 +907,7 @@ def _all_placed(envelope: Envelope, *, early: bool) -> tuple[list[PlacedCheck], 
     """
     others = [part for part in envelope.checks if part is not envelope.check]
     views = {
-        part.name: _placed(
-            envelope, part, f"_{others.index(part) + 2}" if part in others else "", early=early
-        )
+        part.name: placed(envelope, part, f"_{others.index(part) + 2}" if part in others else "", early=early)
         for part in envelope.checks
     }
     return list(views.values()), [views[part.name] for part in envelope.filling]
@@ -942,7 +941,7 @@ def _marked(plan: Plan, title: str) -> MarkedView:
     assert address is not None
     return MarkedView(
         title=title,
-        check=_check_view(check) if check else None,
+        check=check_view(check) if check else None,
         address=address,
         marker=in_hex(end.header.marker),
         address_shift=end.header.address.shift,

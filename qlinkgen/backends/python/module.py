@@ -12,7 +12,8 @@ from qlinkgen.backends.base import banner
 from qlinkgen.backends.python import frames, tables
 from qlinkgen.backends.python.classes import ClassBuilder, ClassModel
 from qlinkgen.backends.python.fitted import fitted
-from qlinkgen.backends.python.frames import FrameView, MarkedView, PacketView, PartsView, UniqueView
+from qlinkgen.backends.python.frames import MarkedView, PacketView, PartsView, UniqueView
+from qlinkgen.backends.python.kinds import AnyView, KindsView, kinds_view
 from qlinkgen.backends.python.layout import WIDTH
 from qlinkgen.backends.python.names import by_kind, class_name, imported
 from qlinkgen.backends.python.place import Place, place_of
@@ -72,7 +73,7 @@ class Imports:
 class ModuleView:
     """The variables of the templates of a module; `f` is its frame."""
 
-    f: FrameView
+    f: AnyView
     decoded_directions: Sequence[frames.DecodedDirection]
     direction_type: str
     direction_default: str
@@ -109,7 +110,7 @@ class Module:
         plan, models = self.plan, self.builder.build()
         sizes = sorted({each.body_size for each in models if each.body_size is not None})
         title = one_line(plan.protocol.title)
-        views = {way: frames.view_of(each, title, sizes) for way, each in plan.ways.items()}
+        views: Mapping[str, AnyView] = {way: _view(each, title, sizes) for way, each in plan.ways.items()}
         view, sections = views[list(views)[-1]], Sections(views, plan.received_directions, bool(plan.beside))
         decoded_directions = frames.decoded_directions(plan, sections.ways)
         quoted = [f'"{each.direction}"' for each in decoded_directions]
@@ -151,7 +152,7 @@ class Module:
         banner_lines = [line for other in others for line in textwrap.wrap(other, WIDTH)]
         return python_text.docstring([*opening, "", *textwrap.wrap(about, WIDTH), "", *banner_lines])
 
-    def _classes(self, models: Sequence[ClassModel], view: FrameView, ways: Ways) -> str:
+    def _classes(self, models: Sequence[ClassModel], view: AnyView, ways: Ways) -> str:
         template = templates().get_template("templates/class.j2")
         framed = self.place.envelope is not None
         texts = []
@@ -169,18 +170,18 @@ class Module:
         return "".join(texts).strip("\n")
 
     @staticmethod
-    def _wrap(each: ClassModel, view: FrameView) -> list[str]:
+    def _wrap(each: ClassModel, view: AnyView) -> list[str]:
         match view:
             case UniqueView():
                 return frames.wrap_lines(view, each.body_size)
             case PartsView():
                 return [f"return _wrapped(body{', self' if view.seeds else ''})"]
-            case MarkedView() | PacketView():
+            case MarkedView() | PacketView() | KindsView():
                 return []
 
     # Names
 
-    def _imports(self, views: Sequence[FrameView], models: Sequence[ClassModel]) -> Imports:
+    def _imports(self, views: Sequence[AnyView], models: Sequence[ClassModel]) -> Imports:
         """Imports used by the classes and by the templates of the frame."""
         plan, used = self.plan, {*self.place.used, *_PUBLIC, "BaseMessage", "as_bytes", "wrong_size"}
         used |= {"OpenEnum", "named"} if plan.enums else set()
@@ -210,6 +211,9 @@ class Module:
                 used |= {"Marking", "illegal", "index", "refused"}
             case PacketView():
                 used |= {"short_of"}
+            case KindsView():
+                used |= {"wrong_check", *view.makers} if view.makers else set()
+                used |= {"illegal", "index", "refused"} if view.address else set()
         seeds = isinstance(view, PartsView) and view.seeds
         held = self.plan.directed and bool(self.plan.beside)
         if isinstance(view, UniqueView | PartsView) and not view.address and not seeds and not held:
@@ -225,11 +229,11 @@ class Module:
             decimal="Decimal" in used,
             index="index" in used,
             modules={module: sorted(names, key=imported) for module, names in shared.items() if names},
-            callable=isinstance(view, UniqueView),
+            callable=isinstance(view, UniqueView | KindsView),
             typing=sorted(typing),
         )
 
-    def _public(self, view: FrameView, decoded_directions: Sequence[frames.DecodedDirection]) -> list[str]:
+    def _public(self, view: AnyView, decoded_directions: Sequence[frames.DecodedDirection]) -> list[str]:
         names = [class_name(message) for message in self.plan.messages]
         constants: list[Enum | Flags] = [*self.plan.enums, *self.plan.flags]
         names += [self.place.classes[each.name] for each in (*constants, *self.plan.layouts)]
@@ -245,11 +249,17 @@ class Module:
                 names += ["Request", "Response", "decode_request", "decode_response"]
             case MarkedView():
                 names += ["MARKING", "Marking"]
+            case KindsView():
+                pass
             case UniqueView() | PartsView():
                 names += ["IDLE"] if view.idle else []
         if not isinstance(view, PacketView):
             names += ["encode", *(["Codec"] if view.check and view.check.selectable else [])]
         return sorted(set(names), key=by_kind)
+
+
+def _view(plan: Plan, title: str, sizes: Sequence[int]) -> AnyView:
+    return kinds_view(plan, title) if plan.frame.kinds else frames.view_of(plan, title, sizes)
 
 
 def _asked(plan: Plan) -> list[str]:

@@ -110,6 +110,8 @@ def place_of(plan: Plan) -> Place:
         case Hunt():
             envelope: Envelope | None = plan.frame.envelope
             unique = True
+        case Rescan() if plan.frame.kinds:
+            envelope, unique = None, False
         case Rescan():
             envelope, unique = plan.frame.envelope, False
         case Marks() | InStep():

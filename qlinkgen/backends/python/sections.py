@@ -10,7 +10,7 @@ import jinja2
 
 from qlinkgen.backends import python_text
 from qlinkgen.backends.base import environment
-from qlinkgen.backends.python.frames import FrameView
+from qlinkgen.backends.python.kinds import AnyView
 from qlinkgen.backends.python.ways import Ways, definitions, differing, merged
 from qlinkgen.model.message import Direction
 
@@ -38,7 +38,7 @@ class Sections:
         beside: frames have values.
     """
 
-    views: Mapping[str, FrameView]
+    views: Mapping[str, AnyView]
     received: Sequence[Direction]
     beside: bool
 
@@ -48,10 +48,10 @@ class Sections:
         return len(self.views) > 1
 
     @property
-    def _view(self) -> FrameView:
+    def _view(self) -> AnyView:
         return list(self.views.values())[-1]
 
-    def _rendered(self, template: str, view: FrameView, **more: object) -> str:
+    def _rendered(self, template: str, view: AnyView, **more: object) -> str:
         found = templates().get_template(f"templates/{template}.j2")
         return found.render(f=view, directed=self.directed, beside=self.beside, **more)
 

@@ -98,15 +98,16 @@ class _Vectors:
         return next(found, b"")
 
     def faults(self, messages: Iterable[Mapping[str, Good]]) -> Iterator[Mapping[str, Json]]:
-        """The wrong frames; those that are the same for all messages only for the first of each direction."""
+        """The wrong frames; those of all messages only for the first of each direction and kind of frame."""
         faults = Faults(self._codec)
-        begun: set[Direction] = set()
+        begun: set[tuple[Direction, str]] = set()
         for good in messages:
-            one = good["defaults"]
-            if one.message.asked and not self._codec.plan.is_first(one.message):
+            if good["defaults"].message.asked and not self._codec.plan.is_first(good["defaults"].message):
                 continue  # wrong ones may be other answers
-            yield from (bad.entry() for bad in faults.of(one, first=one.message.direction not in begun))
-            begun.add(one.message.direction)
+            for one in {each.frame.name: each for each in reversed([*good.values()])}.values():
+                place = one.message.direction, one.frame.name
+                yield from (bad.entry() for bad in faults.of(one, first=place not in begun))
+                begun.add(place)
 
     def rows(self, vectors: Mapping[str, Good]) -> Iterator[Mapping[str, Json]]:
         """The lines of a message in the file, one for each distinct frame."""

@@ -19,6 +19,7 @@ from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.content import Raw, pack, pack_items, places, unpack_items
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
+from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
     AddressPart,
     AddressSlot,
@@ -70,6 +71,11 @@ class Good:
     wire: bytes
     #: The frame that it answers, b"" if it does not depend on one.
     request: bytes
+
+    @property
+    def frame(self) -> FramePlan:
+        """The kind of its frame."""
+        return self.message.frame_for(len(self.payload))
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +138,8 @@ class _Frame:
 
     def __init__(self, codec: Codec, good: Good) -> None:
         self._codec, self._good, self._message = codec, good, good.message
-        self._envelope, self._transparency = good.message.envelope, codec.plan.frame.transparency
+        self._frame = good.frame
+        self._envelope, self._transparency = good.message.envelope_in(good.frame), good.frame.transparency
         self._cells = self._made(good.payload)
 
     def changes(self, *, first: bool) -> Iterator[tuple[str, str, bytes]]:
@@ -150,7 +157,8 @@ class _Frame:
 
     def _made(self, payload: bytes) -> dict[str, bytes]:
         good = self._good
-        return self._codec.cells(self._message, self._codec.sent(payload), good.address or 0, good.beside)
+        sent = self._codec.sent(payload)
+        return self._codec.cells(self._message, sent, good.address or 0, good.beside, self._frame)
 
     def _derived(self, cells: dict[str, bytes], changed: Part) -> Mapping[str, bytes]:
         """The parts, those that are derived from others computed again."""
@@ -161,7 +169,7 @@ class _Frame:
         return cells
 
     def _joined(self, cells: Mapping[str, bytes]) -> bytes:
-        return self._codec.join(self._message, cells, self._good.request)
+        return self._codec.join(self._message, cells, self._good.request, self._frame)
 
     # Parts
 
@@ -233,7 +241,7 @@ class _Frame:
     def _unused(self, most: int) -> Iterable[int]:
         """An unused message number, if there is one."""
         ends = {part.end_id for part in self._envelope.parts if isinstance(part, MarkPart)}
-        taken = {message.id for message in self._codec.plan.messages} | ends
+        taken = {message.id - self._frame.base for message in self._codec.plan.messages} | ends
         return itertools.islice((number for number in range(1, most + 1) if number not in taken), 1)
 
     def _marks(self, part: MarkPart) -> Iterator[tuple[str, Mapping[str, bytes]]]:

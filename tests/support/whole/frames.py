@@ -141,7 +141,7 @@ def _shorter(rng: random.Random, spec: Doc) -> object:
     return rng.choice(forms)
 
 
-def _algorithm(rng: random.Random) -> tuple[str | Doc, int]:
+def draw_algorithm(rng: random.Random) -> tuple[str | Doc, int]:
     """A checksum and its width, mostly sums and CRCs of eight and sixteen bits."""
     found: str | Doc = rng.choice(
         (
@@ -157,6 +157,11 @@ def _algorithm(rng: random.Random) -> tuple[str | Doc, int]:
     return found, checks.width(found)
 
 
+def width_type(width: int) -> str:
+    """The type of a check value."""
+    return _WIDTHS[width]
+
+
 def _parameters(rng: random.Random) -> Doc:
     """A CRC with parameters of its own."""
     width = rng.choice((8, 16, 16, 32))
@@ -169,7 +174,8 @@ def _crcs(bits: int) -> Sequence[str]:
     return [name for name, row in checks.catalogue().items() if int(row["width"]) == bits]
 
 
-def _order(rng: random.Random) -> Doc:
+def order(rng: random.Random) -> Doc:
+    """A byte order, if not that of the file."""
     return {"byteorder": rng.choice(("big", "little"))} if rng.random() < 0.4 else {}
 
 
@@ -320,21 +326,21 @@ class _Parts:
         else:
             kind = rng.choices(("u8", "u16", "u24", "u32", "u64"), (30, 5, 1, 2, 1))[0]
         name = {"message": "code", "address": "node", "length": "length"}[role]
-        return name, {"role": role, "type": kind, **_order(rng)}
+        return name, {"role": role, "type": kind, **order(rng)}
 
     def _checked(self, names: Doc, *, whole: bool) -> None:
         """A check value; `whole`: over everything after the first part, and sent whole."""
         if not whole and not self._chance(0.78):
             return
         rng, covered = self.rng, self._coverable(names)
-        algorithm, width = _algorithm(rng)
+        algorithm, width = draw_algorithm(rng)
         if whole:
             covered = covered[1:]
         elif self._chance(0.35):
             covered = [name for name in covered if rng.random() < 0.7] if self._chance(0.7) else []
             covered = covered or ([names["payload"]] if "blocks" not in names else self._coverable(names)[:1])
         spec: Doc = {"role": "checksum", "type": _WIDTHS[width], "algorithm": algorithm, "over": covered}
-        spec |= _order(rng) | self._start(width)
+        spec |= order(rng) | self._start(width)
         if covered == [names["payload"]] and self._chance(0.5):
             spec["otherwise"] = rng.randrange(1 << width)
         if not whole and self._chance(0.15):
@@ -375,7 +381,7 @@ class _Parts:
 
     def _blocks(self, names: Doc) -> str:
         """Check values of the blocks of the payload."""
-        rng, (algorithm, width) = self.rng, _algorithm(self.rng)
+        rng, (algorithm, width) = self.rng, draw_algorithm(self.rng)
         every = rng.choice(("16 bytes", "1 byte", "3 bytes", "8 bytes", "600 bytes"))
         spec = {
             "role": "checksum",
@@ -384,18 +390,18 @@ class _Parts:
             "over": [names["payload"]],
         }
         return self._add(
-            "blocks", {**spec, "every": every, **_order(rng), **self._start(width), **self._sent(width)}
+            "blocks", {**spec, "every": every, **order(rng), **self._start(width), **self._sent(width)}
         )
 
     def _also_checked(self, names: Doc) -> None:
         """One more check value at any place, often in the header and over it alone."""
         rng, others = self.rng, list(self.parts)
-        algorithm, width = _algorithm(rng)
+        algorithm, width = draw_algorithm(rng)
         front = others[: others.index(names["payload"])]
         covered = front if front and self._chance(0.5) else self._coverable(names)
         covered = [name for name in covered if rng.random() < 0.7] or covered[:1]
         spec: Doc = {"role": "checksum", "type": _WIDTHS[width], "algorithm": algorithm, "over": covered}
-        shape = {"as": f"hex[{width // 4}]"} if self._chance(0.15) else _order(rng) | self._sent(width)
+        shape = {"as": f"hex[{width // 4}]"} if self._chance(0.15) else order(rng) | self._sent(width)
         name = self._add("head", self._seeded(spec) | self._start(width) | shape)
         least = 1 if "lead" in names else 0
         place = rng.randint(least, len(front) if self._chance(0.7) else len(others))
@@ -562,7 +568,7 @@ def _packet(rng: random.Random) -> Shape:
         check: Doc = {"role": "checksum", "type": f"u{checks.width(name)}", "algorithm": name, "words": word}
         if rng.random() < 0.6:
             check["rejected"] = rng.choice((0, 0, 0xFF))
-        parts["check"] = check | _order(rng)
+        parts["check"] = check | order(rng)
     else:
         word = 1
     return Shape(

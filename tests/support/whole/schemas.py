@@ -5,12 +5,13 @@ from __future__ import annotations
 import random
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from tests.support.whole import frames, words
+from tests.support.whole import frames, kinds, words
 from tests.support.whole.fields import FieldMaker, Room
 from tests.support.whole.frames import Shape
+from tests.support.whole.kinds import Kinds
 
 Doc = dict[str, Any]
 _PLAIN = re.compile(r"[a-z][a-z0-9_]*\Z", re.ASCII)
@@ -19,6 +20,8 @@ _YAML_WORDS = frozenset("true false null yes no on off y n nan inf".split())  # 
 _VARIABLE = 5
 #: One in this number of schemas with a master has a link instead.
 _LINK = 9
+#: One in this number of schemas has several kinds of frame.
+_KINDS = 8
 _MEANS = ("refused", "again", "pending", "done")
 #: Mappings below this depth are written on one line.
 _BLOCKS = 4
@@ -73,7 +76,8 @@ class _Maker:
 
     def make(self) -> Doc:
         rng = self.rng
-        shape = frames.choose(rng, self.words)
+        several = kinds.draw(rng) if self.seed % _KINDS == _KINDS - 1 else None
+        shape = several.families[0].shape if several else frames.choose(rng, self.words)
         protocols = words.HOSTILE_PROTOCOLS if self.hostile and rng.random() < 0.3 else words.PROTOCOLS
         document: Doc = {
             "qlinkgen": 1,
@@ -92,13 +96,75 @@ class _Maker:
         if self.seed % _VARIABLE == _VARIABLE - 1:
             maker.variable = 0.7
         document |= maker.types()
-        document["frame"] = shape.frame
+        document |= {"frames": several.frames} if several else {"frame": shape.frame}
         document["bus"] = self._bus(shape)
-        document |= self._traffic(shape, maker, document["bus"])
+        if several:
+            document |= self._kinds(several, maker, document["bus"])
+        else:
+            document |= self._traffic(shape, maker, document["bus"])
         if shape.bus == "master_slave" and self.seed % _LINK == 1:
             _link(document)
         maker.forget_unused(document)
         return document
+
+    def _kinds(self, several: Kinds, maker: FieldMaker, bus: Doc) -> Doc:
+        """Commands and messages, each in frames of its kind."""
+        found: Doc = {"commands": {}, "messages": {}}
+        taken: set[str] = set(maker.taken)
+        for family in several.families:
+            self._ids, shape = family.ids, family.shape
+            makes = replace(maker, shape=shape)
+            asks = bool(shape.address_bits) or not several.addressed
+            tiny = shape.id_bits == 0
+            for _ in range(self.rng.randint(0, 2) if asks and not tiny else 0):
+                command = self._command(shape, makes, bus, attributes=False)
+                found["commands"][self.words.name(taken)] = command | family.spec
+            for _ in range(1 if tiny else self.rng.randint(1, 2)):
+                message = self._message(shape, makes, "messages")
+                if not asks or tiny:
+                    message["direction"] = "response"
+                found["messages"][self.words.name(taken)] = message | family.spec
+        self._answered_otherwise(several, maker, found)
+        return {key: value for key, value in found.items() if value or key == "commands"}
+
+    def _answered_otherwise(self, several: Kinds, maker: FieldMaker, found: Doc) -> None:
+        """Let some commands be answered by a message, or in a frame of another kind."""
+        rng = self.rng
+        sent = [name for name, spec in found["messages"].items() if spec.get("direction") == "response"]
+        for spec in found["commands"].values():
+            if spec["response"] == "none":
+                continue
+            if sent and rng.random() < 0.3:
+                spec["response"] = rng.choice(sent)
+                continue
+            family = rng.choice(several.families)
+            if family.name and family.shape.id_bits and rng.random() < 0.5:
+                self._ids = family.ids
+                fields = replace(maker, shape=family.shape).fields(Room.of(family.shape))
+                spec["response"] = {"frame": family.name, **self._identified(family.shape), "fields": fields}
+
+        if several.families[0].shape.bus == "master_slave" and rng.random() < 0.5:
+            self._dialogue_in_kinds(several, maker, found, sent)
+
+    def _dialogue_in_kinds(self, several: Kinds, maker: FieldMaker, found: Doc, sent: list[str]) -> None:
+        """Let one command be a dialogue of frames of several kinds."""
+        rng = self.rng
+        fit = [each for each in found["commands"].values() if self._may_have_steps(each)]
+        asking = [each for each in several.families if each.shape.address_bits or not several.addressed]
+        asking = [each for each in asking if each.name and each.shape.id_bits]
+        if not fit or isinstance(fit[0]["response"], str):
+            return
+        steps: list[Doc] = []
+        for key in rng.choices(("send", "receive"), k=rng.randint(1, 3)):
+            if key == "receive" and sent:
+                steps.append({key: rng.choice(sent)})
+            elif asking:
+                family = rng.choice(asking)
+                self._ids = family.ids
+                fields = replace(maker, shape=family.shape).fields(Room.of(family.shape))
+                own = {"frame": family.name, **self._identified(family.shape), "fields": fields}
+                steps.append({key: own})
+        fit[0]["steps"] = [*steps, {"receive": "response"}]
 
     def _bus(self, shape: Shape) -> Doc:
         rng = self.rng

@@ -29,6 +29,7 @@ from tests.support.cdriver import Driver
 from tests.support.whole.reference import Event, Raw, Reference, Seen, Wrong
 from tests.support.whole.reference.document import Message, Number, Record, Records, Run, Value
 from tests.support.whole.reference.frames import Frame
+from tests.support.whole.reference.kinds import Kinds
 from tests.support.whole.reference.special import Packets
 from tests.support.whole.reference.values import decode as decode_payload
 from tests.support.whole.reference.values import default, holds
@@ -193,7 +194,7 @@ class PythonTarget(Target):
         self, message: Message, given: Mapping[str, Raw], address: int, request: bytes
     ) -> tuple[bytes, bytes]:
         """See Target."""
-        place = {self._address: address} if self._address else {}
+        place = {self._address: address} if message.addresses else {}
         natives = {naming.attribute(name): each for name, each in self.natives(message, given).items()}
         try:
             made = self.module.MESSAGES[message.name](**self._objects(message.name, natives), **place)
@@ -235,7 +236,7 @@ class PythonTarget(Target):
     def _seen(self, found: Any) -> Seen:
         shape = self.reference.by_name[found.NAME]
         values = self.raws(shape, lambda each: getattr(found, naming.attribute(each)))
-        return Seen(found.NAME, getattr(found, self._address) if self._address else None, values)
+        return Seen(found.NAME, getattr(found, self._address) if found.ADDRESS else None, values)
 
     def events(
         self, direction: Direction, pieces: Sequence[bytes], asked: Sequence[bytes] = ()
@@ -272,7 +273,7 @@ class InterpreterTarget(Target):
         self, message: Message, given: Mapping[str, Raw], address: int, request: bytes
     ) -> tuple[bytes, bytes]:
         """See Target."""
-        place = address if self.reference.address_name else None
+        place = address if message.addresses else None
         try:
             wire = self._codec.encode(message.name, message.by_name(given), place, request)
             return pack(self._plan.message(message.name).payload, message.by_name(given)), wire
@@ -345,7 +346,7 @@ class ConstructTarget(Target):
         fields = {**found["fields"], **{name: found[naming.record_key(name)] for name, _ in message.beside}}
         values = self.raws(message, lambda each: fields[each])
         name = self.reference.address_name
-        return Seen(found["message"], found[naming.record_key(name)] if name else None, values)
+        return Seen(found["message"], found.get(naming.record_key(name)) if name else None, values)
 
 
 def printed_structures(outputs: Outputs, folder: Path) -> construct.Live:
@@ -386,7 +387,7 @@ class CTarget(Target):
         self._driver = driver
         frame = reference.frame
         #: Only receivers with look-back have events at the end of a stream.
-        self.finishes = isinstance(frame, Frame) and not frame.unique
+        self.finishes = isinstance(frame, Kinds) or (isinstance(frame, Frame) and not frame.unique)
 
     def encode(
         self, message: Message, given: Mapping[str, Raw], address: int, request: bytes
@@ -418,7 +419,7 @@ class CTarget(Target):
             read = {name: told(kind, _raw(kind, words)) for name, kind in slot.values()}
             values |= dict.fromkeys(read) if absent else read
         assert not list(words)
-        return Seen(message.name, None if address == "-" else int(address), values)
+        return Seen(message.name, int(address) if message.addresses else None, values)
 
     def events(self, direction: Direction, stream: bytes) -> list[Heard]:
         """The events of a stream fed byte by byte."""
@@ -435,7 +436,7 @@ class CTarget(Target):
             values = str({**beside, **decode_payload(message, _bytes(payload))})
         except Wrong as wrong:
             values = f"{payload}, which is refused: {wrong}"
-        return Heard(int(at), kind, name, None if address == "-" else int(address), values)
+        return Heard(int(at), kind, name, int(address) if message.addresses else None, values)
 
     def _ask(self, *words: object) -> list[str]:
         status, *answer = self._driver.ask(*words).split()

@@ -30,6 +30,7 @@ from tests.support.whole import chance, schemas
 from tests.support.whole.reference import Reference, Seen, Wrong
 from tests.support.whole.reference.document import Message
 from tests.support.whole.reference.frames import Frame
+from tests.support.whole.reference.kinds import Kinds
 from tests.support.whole.reference.special import Packets
 from tests.support.whole.targets import (
     ConstructTarget,
@@ -215,7 +216,8 @@ class _Trial:
 
     def _driver(self, protocol: Protocol, programs: contextlib.ExitStack) -> None:
         frame = self.reference.frame
-        counts = isinstance(frame, Frame) and "length" not in frame.by_role
+        frames = frame.frames.values() if isinstance(frame, Kinds) else [frame]
+        counts = any(isinstance(each, Frame) and "length" not in each.by_role for each in frames)
         checked = counts or self.outcome.seed % self.effort.sanitized == 0
         folder = self.folder / "driver"
         folder.mkdir()
@@ -550,6 +552,9 @@ def _unlike(expected: Sequence[Heard], found: Sequence[Heard]) -> str:
 def traits(reference: Reference) -> str:
     """A short description of a frame."""
     frame = reference.frame
+    if isinstance(frame, Kinds):
+        ends = ("length" if "length" in each.by_role else "counts" for each in frame.frames.values())
+        return f"kinds {' '.join(ends)}"
     if not isinstance(frame, Frame):
         return type(frame).__name__.lower()
     words = ["hunt" if frame.unique else "search", "bare" if frame.bare else "lead"]

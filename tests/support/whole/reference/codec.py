@@ -6,9 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tests.support.whole.reference import document, values
-from tests.support.whole.reference.asked import CARRIER, asked
-from tests.support.whole.reference.document import Direction, Fields, Message, Number, part_doc, whole_span
+from tests.support.whole.reference.asked import CARRIER, Asked, asked
+from tests.support.whole.reference.document import (
+    Direction,
+    Doc,
+    Fields,
+    Message,
+    Number,
+    part_doc,
+    whole_span,
+)
 from tests.support.whole.reference.frames import Frame
+from tests.support.whole.reference.kinds import Kinds, address_of
 from tests.support.whole.reference.receivers import (
     Event,
     Hunter,
@@ -36,10 +45,30 @@ class Reference:
     def __init__(self, text: str) -> None:
         """Read the text of a schema."""
         data = document.load(text)
+        self.frame: Frame | Marked | Packets | Kinds
+        self.requests: Frame | Marked | Packets | Kinds
+        self.messages: tuple[Message, ...]
+        self.asked: Asked | None = None
+        if "frames" in data:
+            self._read_kinds(Kinds(data))
+        else:
+            self._read(data)
+        self.by_name = {message.name: message for message in self.messages}
+        used = {message.direction for message in self.messages}
+        self.directions: tuple[Direction, ...] = (
+            ("message",) if used == {"message"} else ("request", "response")
+        )
+
+    def _read_kinds(self, kinds: Kinds) -> None:
+        self.frame = self.requests = kinds
+        names = [name for each in kinds.documents.values() if (name := address_of(each))]
+        self.address_name = names[0] if names else None
+        self.messages = tuple(kinds.messages())
+
+    def _read(self, data: Doc) -> None:
         shape = data["frame"]
         if "parts" in shape:
-            self.frame: Frame | Marked | Packets = Frame(data, "response")
-            self.requests: Frame | Marked | Packets = Frame(data, "request")
+            self.frame, self.requests = Frame(data, "response"), Frame(data, "request")
         else:
             self.frame = self.requests = Marked(data) if "marked" in shape else Packets(data)
         parts = {**shape.get("parts", {}), **shape.get("packet", {})}
@@ -67,13 +96,8 @@ class Reference:
                 *self.messages,
                 replace(self.asked.carrier, beside=self._beside(self.asked.carrier)),
             )
-        self.by_name = {message.name: message for message in self.messages}
-        used = {message.direction for message in self.messages}
-        self.directions: tuple[Direction, ...] = (
-            ("message",) if used == {"message"} else ("request", "response")
-        )
 
-    def frame_of(self, direction: Direction) -> Frame | Marked | Packets:
+    def frame_of(self, direction: Direction) -> Frame | Marked | Packets | Kinds:
         """The frame of a direction; only frames of parts can differ."""
         return self.frame if direction == "response" else self.requests
 
@@ -82,9 +106,11 @@ class Reference:
         return frame.beside if isinstance(frame, Frame) else ()
 
     def known(self, direction: Direction) -> dict[int, Message]:
-        """The messages of a direction."""
+        """The messages of a direction by their number, of several kinds of frame by any."""
         hidden = self.asked.names if self.asked is not None else ()
         sent = [each for each in self.messages if each.direction in (direction, "message")]
+        if isinstance(self.frame, Kinds):
+            return dict(enumerate(sent))
         return {each.number: each for each in sent if each.name not in hidden}
 
     def asking(self, message: Message) -> Mapping[str, Sequence[Message]]:
@@ -121,6 +147,8 @@ class Reference:
         """A frame around a payload, which is not checked; `given` are values of the frame."""
         message = self.by_name[name]
         frame = self.frame_of(message.direction)
+        if isinstance(frame, Kinds):
+            return frame.wrap(message, payload, address, given or {})
         if isinstance(frame, Frame):
             return frame.wrap(message.number, payload, address, given or {})
         if isinstance(frame, Marked):
@@ -138,7 +166,9 @@ class Reference:
                 raise Wrong("unknown")
             payload = frame.opened(message, wire, request)
             return Seen(message.name, None, values.decode(message, payload))
-        if isinstance(frame, Frame):
+        if isinstance(frame, Kinds):
+            event = frame.searcher(known).whole(wire)
+        elif isinstance(frame, Frame):
             event = Searcher(frame, known).whole(wire)
         else:
             frame.check_ends(wire)
@@ -167,6 +197,8 @@ class Reference:
     def receiver(self, direction: Direction, asked: Sequence[bytes] = ()) -> Receiver:
         """A new receiver; `asked` are the requests that are answered."""
         known, frame = self.known(direction), self.frame_of(direction)
+        if isinstance(frame, Kinds):
+            return frame.searcher(known)
         if isinstance(frame, Marked):
             return MarkedReceiver(frame, known)
         if isinstance(frame, Packets):

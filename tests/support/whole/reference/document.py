@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import struct
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Literal
@@ -298,6 +298,8 @@ class Message:
     #: The byte between texts, and the bytes that a text does not have.
     separator: bytes = b""
     barred: bytes = b""
+    #: Kinds of frame that carry it, if there are several.
+    frames: tuple[str, ...] = ()
 
     def values(self) -> Iterator[tuple[str, Value]]:
         """Values in wire order, those of the frame first."""
@@ -343,7 +345,7 @@ def _newest(node: Any) -> Any:
 def load(text: str) -> Doc:
     """The plain data of a schema file."""
     document: Doc = _newest(yaml.load(text, _Loader))
-    parts = document["frame"].get("parts", {})
+    parts = document.get("frame", {}).get("parts", {})
     # Silence has no bytes, and frames end without it.
     for name in [
         name for name, spec in parts.items() if isinstance(spec, dict) and spec.get("role") == "idle"
@@ -783,10 +785,11 @@ def seeds(document: Doc, message: str) -> Mapping[str, bytes]:
 
 def messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, ...]:
     """All messages of a file, in order."""
-    return tuple(_with_separator(each, document) for each in _messages(document, fields, addressed))
+    return tuple(with_separator(each, document) for each in _messages(document, fields, addressed))
 
 
-def _with_separator(message: Message, document: Doc) -> Message:
+def with_separator(message: Message, document: Doc) -> Message:
+    """A message with the text that its schema puts between its values."""
     name, _, reply = message.name.partition(".")
     usual = document.get("defaults", {}).get("separator")
     places = [document.get("messages", {}).get(name), document.get("commands", {}).get(name)]
@@ -821,25 +824,28 @@ def _messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, 
     found: list[Message] = []
     for name, spec in document.get("commands", {}).items():
         defaults = document.get("defaults", {})
-        merged = {**defaults, **spec, "response": _answer(spec.get("response"), defaults.get("response"))}
-        found += _of_command(name, merged, document, fields, addressed)
-        found += _steps(name, merged, document, fields, addressed)
+        merged = {**defaults, **spec, "response": answer(spec.get("response"), defaults.get("response"))}
+        found += of_command(name, merged, document, fields, addressed)
+        found += steps(name, merged, lambda _kind: (document, fields, addressed))
         found += _replies(name, merged, document, fields, {each.name for each in found}, addressed=addressed)
-    nodes = _nodes(document) if addressed else None
     for name, spec in document.get("messages", {}).items():
-        direction = _sent(document, spec)
-        found.append(
-            Message(
-                name,
-                numbered(document, spec.get("id"), direction),
-                direction,
-                fields.build(spec["fields"]),
-                (nodes,) if nodes else (),
-                nodes[0] if nodes else 0,
-                checked=_checked(document, name),
-            )
-        )
+        found.append(single(name, spec, document, fields, addressed))
     return tuple(found)
+
+
+def single(name: str, spec: Doc, document: Doc, fields: Fields, addressed: bool) -> Message:
+    """A message that is not part of a command."""
+    nodes = _nodes(document) if addressed else None
+    direction = _sent(document, spec)
+    return Message(
+        name,
+        numbered(document, spec.get("id"), direction),
+        direction,
+        fields.build(spec["fields"]),
+        (nodes,) if nodes else (),
+        nodes[0] if nodes else 0,
+        checked=_checked(document, name),
+    )
 
 
 def _sent(document: Doc, spec: Doc) -> Direction:
@@ -850,9 +856,16 @@ def _sent(document: Doc, spec: Doc) -> Direction:
     return direction
 
 
-def _of_command(name: str, spec: Doc, document: Doc, fields: Fields, addressed: bool) -> Iterator[Message]:
-    both: tuple[Direction, ...] = ("request", "response")
-    for direction in both:
+def of_command(  # noqa: PLR0917  # what the reference reads
+    name: str,
+    spec: Doc,
+    document: Doc,
+    fields: Fields,
+    addressed: bool,
+    directions: tuple[Direction, ...] = ("request", "response"),
+) -> Iterator[Message]:
+    """The messages of a command in some directions."""
+    for direction in directions:
         if isinstance(spec[direction], str):  # none, or the name of a message
             continue
         if direction == "response" and not _responds(spec):
@@ -886,17 +899,18 @@ def _responds(spec: Doc) -> bool:
     return "steps" not in spec or any(step.get("receive") == "response" for step in spec["steps"])
 
 
-def _steps(name: str, spec: Doc, document: Doc, fields: Fields, addressed: bool) -> Iterator[Message]:
-    """The messages of a dialogue that steps describe."""
-    steps = spec.get("steps", [])
-    last = max((index for index, step in enumerate(steps) if "receive" in step), default=None)
-    nodes = (_nodes(document),) if addressed else ()
-    for index, step in enumerate(steps):
+def steps(name: str, spec: Doc, place: Callable[[str | None], tuple[Doc, Fields, bool]]) -> Iterator[Message]:
+    """The messages of a dialogue that steps describe; `place` tells where those of a kind are built."""
+    listed = spec.get("steps", [])
+    last = max((index for index, step in enumerate(listed) if "receive" in step), default=None)
+    for index, step in enumerate(listed):
         key = "send" if "send" in step else "receive"
         if isinstance(step[key], str):
             continue
         direction: Direction = "request" if key == "send" else "response"
         written = long_form(step[key])
+        document, fields, addressed = place(written.get("frame"))
+        nodes = (_nodes(document),) if addressed else ()
         number = _number(document, written.get("id"), spec.get("id"), direction)
         given = written["fields"]
         if index == last:
@@ -933,7 +947,7 @@ def _whole(slot: Slot, slots: Sequence[Slot]) -> Slot:
     return replace(slot, kind=replace(kind, high=kind.items_in(kind.bytes_of(kind.most))))
 
 
-def _answer(own: Any, common: Any) -> Any:
+def answer(own: Any, common: Any) -> Any:
     """A response in its long form, or "none"."""
     given = common if own is None else own
     if isinstance(given, str):
@@ -945,7 +959,7 @@ def long_form(given: Any) -> Doc:
     """A response in its long form, without any fields for a word."""
     if isinstance(given, str):
         return {}
-    is_long = given.keys() <= {"id", "fields", "means"} and (
+    is_long = given.keys() <= {"id", "fields", "means", "frame"} and (
         isinstance(given.get("fields"), dict)
         or ("fields" not in given and re.match(r"\d|request|{'\w+': \d", str(given.get("id", ""))))
     )

@@ -204,7 +204,7 @@ class Searcher(Receiver):
                     self._advance(1)
                     continue
             try:
-                event, size, self.swallow = self._attempt()
+                event, size, self.swallow = self.attempt()
             except NeedMore as more:
                 if not self.ended:
                     self.needed = more.size
@@ -254,7 +254,8 @@ class Searcher(Receiver):
             yield Event("frame", self.at, self.start - len(self.skipped), self.skipped)
         self.skipped = b""
 
-    def _attempt(self) -> tuple[Event, int, bool]:
+    def attempt(self) -> tuple[Event, int, bool]:
+        """The frame at the beginning: its event, its size, and whether an inserted byte may follow."""
         if self.lost and not self.buffer.startswith(self._line_end()):
             if self._line_end().startswith(self.buffer):
                 raise NeedMore
@@ -286,7 +287,7 @@ class Searcher(Receiver):
         raw = self.buffer[: cut.size]
         number, address = (self.frame.number(role, cut.parts) for role in ("message", "address"))
         message = self.known.get(number or 0)
-        seeds = self.frame.seeds[message.number] if message else {}
+        seeds = self.frame.seeds.get(message.number, {}) if message else {}
         if self.frame.check_fails(cut.parts, seeds):
             return Event("crc", self.at, self.start, raw)
         beside = partial(self.frame.values, cut.parts)

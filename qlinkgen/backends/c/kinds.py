@@ -1,0 +1,181 @@
+"""Several kinds of frame in C: each is wrapped and scanned by functions of its own, which two others call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from qlinkgen.backends.c.crc import CheckView
+from qlinkgen.backends.c.layout import Layouts
+from qlinkgen.backends.c.names import unsigned, unsigned_type
+from qlinkgen.backends.c.parts import PartWriter
+from qlinkgen.backends.c.places import in_hex, sender_of
+from qlinkgen.backends.c.views import (
+    FrameView,
+    PartsView,
+    PlainView,
+    directed,
+    frame_view,
+    own_prefix,
+    parts_view,
+    plain_view,
+)
+from qlinkgen.plan.ends import ByMessage
+from qlinkgen.plan.framing import FramePlan
+from qlinkgen.plan.tree import Plan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KindView:
+    """A kind of frame.
+
+    Attributes:
+        name: its name.
+        carries: the condition on ``id`` and ``size`` of what it carries.
+        parameters: those of the function that wraps, for number, address and values.
+        arguments: what is passed to it.
+        id: the expression for the message id of a received frame.
+        address: the expression for its address.
+        sized_by_message: its message gives its size.
+        key: what the names of the functions of its only check value begin with.
+        check: the algorithm of that, None if there is none or several.
+        unused: parameters that the function that wraps does not use.
+    """
+
+    name: str
+    carries: str
+    parameters: str
+    arguments: str
+    id: str
+    address: str
+    sized_by_message: bool
+    key: str
+    check: CheckView | None
+    unused: list[str]
+    most: int
+    parts: PartsView
+    plain: PlainView
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KindsView:
+    """Several kinds of frame: in their order, and those that wrap in the order of their payloads."""
+
+    kinds: Sequence[KindView]
+    wrapped: Sequence[KindView]
+    overhead: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KindsViews:
+    """All views of the kinds of frame of a protocol."""
+
+    algorithms: Sequence[CheckView]
+    f: FrameView
+    kinds: KindsView
+    parts: PartsView
+
+
+def kinds_views(plan: Plan, layouts: Layouts) -> KindsViews:
+    """The views of a protocol with several kinds of frame."""
+    frame = frame_view(plan, max_wire=plan.frame.max_wire)
+    kinds = {each.name: _kind(plan, each, frame, layouts) for each in plan.frame.kinds}
+    ordered = sorted(plan.frame.kinds, key=lambda each: each.max_payload)
+    first = next(iter(kinds.values())).parts
+    return KindsViews(
+        algorithms=list(_writer(plan, plan.frame.kinds[0], layouts).algorithms.values()),
+        f=frame,
+        kinds=KindsView(
+            kinds=list(kinds.values()),
+            wrapped=[kinds[each.name] for each in ordered],
+            overhead=min(each.envelope.overhead for each in plan.frame.kinds),
+        ),
+        parts=replace(
+            first,
+            judged=_unproven(plan.frame),
+            index_type=unsigned_type(max(16, plan.frame.max_wire.bit_length())),
+            max_frame=f"{plan.frame.longest}U",
+        ),
+    )
+
+
+def _unproven(frame: FramePlan) -> str:
+    """The condition for a received frame of a kind without check value, "" if all have one."""
+    terms = []
+    for kind in frame.kinds:
+        if not kind.envelope.checks:
+            offsets = ["", *(f" + {at}U" for at in range(1, len(kind.envelope.preamble)))]
+            tests = [
+                f"(receiver->wire[receiver->first{offset}] == {in_hex(byte)})"
+                for offset, byte in zip(offsets, kind.envelope.preamble, strict=True)
+            ]
+            terms.append(" && ".join(tests) if len(tests) == 1 else f"({' && '.join(tests)})")
+    return " || ".join(terms)
+
+
+def _writer(plan: Plan, kind: FramePlan, layouts: Layouts) -> PartWriter:
+    prefix = plan.protocol.name
+    return PartWriter(
+        prefix,
+        kind,
+        sender_of(kind, prefix),
+        layouts,
+        directed=directed(plan),
+        own=own_prefix(prefix, kind.name),
+        every=tuple(each.envelope for each in plan.frame.kinds),
+    )
+
+
+def _kind(
+    plan: Plan,
+    kind: FramePlan,
+    frame: FrameView,
+    layouts: Layouts,
+) -> KindView:
+    prefix = plan.protocol.name
+    sender = sender_of(kind, prefix)
+    writer = _writer(plan, kind, layouts)
+    alone = writer.alone
+    check = writer.algorithms[alone.check.algorithm] if alone else None
+    parts = parts_view(writer, kind.max_wire)
+    bits = frame.id_bits
+    number = f"({frame.id_type}){writer.number(kind.envelope.id)}" if kind.envelope.id else "0U"
+    if kind.base:
+        base = unsigned(kind.base, bits, hexadecimal=True)
+        number = f"({base} | {number})" if kind.envelope.id else base
+    by_message = isinstance(kind.end, ByMessage)
+    return KindView(
+        name=kind.name,
+        carries=_carries(plan.frame, kind, bits),
+        parameters=sender.parameters,
+        arguments=_arguments(kind, frame, sender.id_type, sender.address),
+        id=number,
+        address=parts.address_value if sender.address else "0U",
+        sized_by_message=by_message,
+        key=check.key if check else "",
+        check=check,
+        unused=[sender.id] if not kind.envelope.id else [],
+        most=kind.max_payload,
+        parts=parts,
+        plain=plain_view(writer, frame.pass_decode_direction),
+    )
+
+
+def _carries(frame: FramePlan, kind: FramePlan, bits: int) -> str:
+    """The condition on the id and the payload size of what a kind carries."""
+    fits = f"size <= {kind.max_payload}U" if kind.max_payload else "size == 0U"
+    bases = sorted({each.base for each in frame.kinds})
+    if len(bases) == 1:
+        return fits
+    step = bases[1]
+    shift = step.bit_length() - 1
+    family = f"(id >> {shift})" if shift else "id"
+    return f"({family} == {unsigned(kind.base // step, bits)}) && ({fits})"
+
+
+def _arguments(kind: FramePlan, frame: FrameView, id_type: str, address: str) -> str:
+    own = sum(each.bits for each in kind.envelope.id) or 8
+    number = frame.id
+    if id_type != frame.id_type or kind.base:
+        number = f"({id_type})({frame.id} & {unsigned((1 << own) - 1, own, hexadecimal=True)})"
+    return f"{number}, {frame.address}" if address else number

@@ -1,0 +1,93 @@
+"""Several kinds of frame, told apart by the constants that they begin with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import BinaryIO
+
+from construct import Construct, Container, ValidationError
+
+from ._fields import Message, Values
+from ._frames import Constant, DelimitedFrame, Frame, FrameError, Part
+
+
+class Kind(DelimitedFrame):
+    """A kind of frame: ``base`` is what ids have more than the number in the frame.
+
+    Its payloads have at least ``least`` bytes.
+    """
+
+    def __init__(
+        self,
+        parts: Sequence[Part],
+        messages: Iterable[Message],
+        *,
+        base: int = 0,
+        least: int = 0,
+        address: str = "",
+    ) -> None:
+        super().__init__(parts, messages, address=address)
+        self.by_id = {each.id - base: each for each in self.by_name.values()}
+        self.base = base
+        self.least = least
+
+    def wrap(
+        self,
+        message: Message,
+        payload: bytes,
+        address: int = 0,
+        request: bytes = b"",
+        number: int | None = None,
+        *,
+        beside: Values | None = None,
+    ) -> bytes:
+        """See Frame."""
+        shown = message.id - self.base if number is None else number
+        return super().wrap(message, payload, address, request, shown, beside=beside)
+
+    def holds(self, message: Message, size: int) -> bool:
+        """Whether it carries the message with a payload of a size."""
+        return message.name in self.by_name and self.least <= size <= self.payload.most
+
+
+class Kinds(Frame):
+    """One frame of several kinds, the shortest one that carries the message and has room for its payload."""
+
+    def __init__(self, *kinds: Kind) -> None:
+        Construct.__init__(self)
+        self.kinds = kinds
+        self.by_name = {name: message for kind in kinds for name, message in kind.by_name.items()}
+
+    def kind_of(self, message: Message, size: int) -> Kind:
+        """The kind of frame for a payload of a size, or else the longest that carries the message."""
+        carrying = [kind for kind in self.kinds if message.name in kind.by_name]
+        return next((kind for kind in carrying if kind.holds(message, size)), carrying[-1])
+
+    def wrap(
+        self,
+        message: Message,
+        payload: bytes,
+        address: int = 0,
+        request: bytes = b"",
+        number: int | None = None,
+        *,
+        beside: Values | None = None,
+    ) -> bytes:
+        """See Frame."""
+        kind = self.kind_of(message, len(payload))
+        return kind.wrap(message, payload, address, request, number, beside=beside)
+
+    def _build(self, obj: Values, stream: BinaryIO, context: Container, path: str) -> Values:
+        message = self.by_name.get(obj["message"])
+        if message is None:
+            raise ValidationError(f"unknown message {obj['message']!r} in this direction", path=path)
+        payload = message.build(obj.get("fields") or {})
+        kind = self.kind_of(message, len(payload))
+        return kind._build(obj, stream, context, path)  # noqa: SLF001  # its kind
+
+    def _frame(self, wire: bytes, request: bytes) -> Container:
+        for kind in self.kinds:
+            first = kind.parts[0]
+            if isinstance(first, Constant) and first.data.startswith(wire[: len(first.data)]):
+                return kind._frame(wire, request)  # noqa: SLF001
+        raise FrameError("frame", f"no kind of frame begins with {wire[:1].hex()}")

@@ -1,0 +1,299 @@
+"""Views of several kinds of frame: for each kind how it is made, found and verified."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import assert_never
+
+from qlinkgen.backends.python import integers, pieces
+from qlinkgen.backends.python.frames import FrameView, PlacedCheck, check_view, placed
+from qlinkgen.backends.python.layout import in_hex, literal
+from qlinkgen.model.naming import address_argument, address_attribute
+from qlinkgen.plan.ends import ByLength
+from qlinkgen.plan.envelope import Envelope
+from qlinkgen.plan.framing import FramePlan
+from qlinkgen.plan.parts import (
+    AddressPart,
+    AddressSlot,
+    BlocksPart,
+    CellPart,
+    CheckPart,
+    ConstantPart,
+    ConstantSlot,
+    EqualPart,
+    IdPart,
+    IdSlot,
+    LengthPart,
+    MarkPart,
+    Numeric,
+    Part,
+    PayloadPart,
+    Slot,
+)
+from qlinkgen.plan.payload import Member
+from qlinkgen.plan.tree import Plan
+
+
+@dataclass(frozen=True)
+class KindView:
+    """A kind of frame.
+
+    Attributes:
+        name: its name.
+        numbers: statements that compute the numbers of its parts from those of message, address and payload.
+        front: expressions for the bytes before the payload.
+        back: those after it, with zeros for check values.
+        addressed: it has an address.
+        checks: the check values in wire order.
+        filling: the same in the order in which they are computed.
+        header: size before the payload.
+        overhead: size before and after it.
+        head_tests: conditions for a wrong header, and the first elements of the result of ``_split``.
+        size: size of the whole frame by its header, "" if the message gives it.
+        tail_tests: conditions for wrong bytes after the payload.
+        number: the number of the message in ``frame``, or in its header ``head``.
+        address: the address in ``frame``, "None" without one.
+        verified: contents that are wrong do not deny a frame with a valid check value.
+    """
+
+    name: str
+    numbers: Sequence[str]
+    front: str
+    back: str
+    addressed: bool
+    checks: Sequence[PlacedCheck]
+    filling: Sequence[PlacedCheck]
+    header: int
+    trailer: int
+    overhead: int
+    head_tests: Sequence[tuple[str, str]]
+    size: str
+    tail_tests: Sequence[str]
+    number_in_head: str
+    number: str
+    address: str
+    verified: bool
+
+
+@dataclass(frozen=True)
+class AddressNames:
+    """The address in Python: its attribute, its parameter, and its default."""
+
+    name: str
+    parameter: str
+    default: int
+
+
+@dataclass(frozen=True)
+class KindsView:
+    """Several kinds of frame.
+
+    Attributes:
+        firsts: the bytes with which frames begin.
+        by_first: the kinds by first byte.
+        families: the maximum payload size of each kind, by the base of its messages.
+        shift: bits of the numbers of messages in frames.
+        measured: the message gives the size of some kinds.
+        idle: as for other frames.
+        check: no algorithm can be replaced.
+    """
+
+    title: str
+    kinds: Sequence[KindView]
+    address: AddressNames | None
+    firsts: Sequence[str]
+    by_first: Sequence[tuple[str, Sequence[KindView]]]
+    families: Sequence[tuple[str, Sequence[tuple[int, KindView, int]]]]
+    measured: bool
+    makers: frozenset[str]
+
+    template = "kinds"
+    check = None
+    idle = None
+
+
+AnyView = FrameView | KindsView
+
+
+def kinds_view(plan: Plan, title: str) -> KindsView:
+    """The view of the kinds of frame of a protocol."""
+    views = {frame.name: _kind(frame) for frame in plan.frame.kinds}
+    firsts: dict[int, list[KindView]] = {}
+    families: dict[int, list[tuple[int, KindView, int]]] = {}
+    for frame in sorted(plan.frame.kinds, key=lambda each: each.max_payload):
+        families.setdefault(frame.base, []).append((frame.max_payload, views[frame.name], frame.base))
+    for frame in plan.frame.kinds:
+        firsts.setdefault(frame.envelope.preamble[0], []).append(views[frame.name])
+    nodes = plan.protocol.bus.nodes
+    name = plan.frame.address
+    address = AddressNames(address_attribute(name), address_argument(name), nodes[0] if nodes else 0)
+    return KindsView(
+        title=title,
+        kinds=list(views.values()),
+        address=address if name else None,
+        firsts=[literal(bytes((first,))) for first in firsts],
+        by_first=[(in_hex(first), kinds) for first, kinds in firsts.items()],
+        families=[(in_hex(base), kinds) for base, kinds in families.items()],
+        measured=any(not view.size for view in views.values()),
+        makers=frozenset(check.view.maker for view in views.values() for check in view.checks),
+    )
+
+
+def _kind(frame: FramePlan) -> KindView:
+    envelope = frame.envelope
+    checks = {part.name: _check(envelope, part, frame.name) for part in envelope.checks}
+    base = f"{frame.base} + " if frame.base else ""
+    addressed = bool(envelope.address)
+    return KindView(
+        name=frame.name,
+        numbers=list(_numbers(envelope)),
+        front=" + ".join(_bytes(part) for part in envelope.front) or 'b""',
+        back=" + ".join(_bytes(part) for part in envelope.back),
+        addressed=addressed,
+        checks=list(checks.values()),
+        filling=[checks[part.name] for part in envelope.filling],
+        header=envelope.header_size,
+        trailer=envelope.trailer_size,
+        overhead=envelope.overhead,
+        head_tests=list(_head_tests(envelope)),
+        size=_size(frame, envelope),
+        tail_tests=[test for part in envelope.back for test in _tail_tests(envelope, part)],
+        number_in_head=base + _grouped(pieces.number(envelope, envelope.id, "head"), base),
+        number=base + _grouped(pieces.number(envelope, envelope.id, "frame"), base),
+        address=pieces.number(envelope, envelope.address, "frame") if addressed else "None",
+        verified=bool(envelope.checks),
+    )
+
+
+def _grouped(number: str, base: str) -> str:
+    return f"({number})" if base and " " in number else number
+
+
+def _check(envelope: Envelope, part: CheckPart, kind: str) -> PlacedCheck:
+    mark = _mark(envelope, part, kind)
+    found = placed(envelope, part, mark, early=part in envelope.header_checks)
+    return replace(found, view=check_view(part.check, mark.upper()))
+
+
+def _mark(envelope: Envelope, part: CheckPart, name: str) -> str:
+    number = envelope.checks.index(part) + 1
+    return f"_{name}" if number == 1 else f"_{number}_{name}"
+
+
+def _size(frame: FramePlan, envelope: Envelope) -> str:
+    if not isinstance(frame.end, ByLength):
+        return ""
+    part = frame.end.part
+    seen = pieces.read(envelope, part, "head")
+    seen = f"{seen} * {part.scale}" if part.scale > 1 else seen
+    more = envelope.overhead - part.bias
+    return f"{seen} {'+' if more > 0 else '-'} {abs(more)}" if more else seen
+
+
+# Making a frame
+
+
+def _numbers(envelope: Envelope) -> Iterator[str]:
+    """Statements that assign the numbers of parts that are not just the message number or the address."""
+    for part in envelope.parts:
+        if isinstance(part, LengthPart | CellPart | EqualPart):
+            yield f"{_local(part)} = {_number(part)}"
+
+
+def _local(part: Numeric) -> str:
+    match part:
+        case IdPart():
+            return "number"
+        case AddressPart():
+            return "address"
+        case LengthPart() | CellPart() | EqualPart():
+            return f"{part.name}_part"
+        case _:
+            assert_never(part)
+
+
+def _number(part: LengthPart | CellPart | EqualPart) -> str:
+    match part:
+        case LengthPart():
+            counted = (
+                f"len(payload) {'+' if part.bias > 0 else '-'} {abs(part.bias)}"
+                if part.bias
+                else "len(payload)"
+            )
+            return f"({counted}) // {part.scale}" if part.scale > 1 else counted
+        case CellPart():
+            terms = [_bits(slot) for slot in part.slots]
+            return terms[0].removeprefix("(").removesuffix(")") if len(terms) == 1 else " | ".join(terms)
+        case EqualPart():
+            return pieces.derived(part, _local(part.of))
+        case _:
+            assert_never(part)
+
+
+def _bits(slot: Slot) -> str:
+    match slot:
+        case IdSlot():
+            mask = in_hex((1 << slot.bits) - 1)
+            taken = f"number >> {slot.at} & {mask}" if slot.at else f"number & {mask}"
+            return f"(({taken}) << {slot.shift})" if slot.shift else f"({taken})"
+        case AddressSlot():
+            return f"address << {slot.shift}" if slot.shift else "address"
+        case ConstantSlot():
+            return in_hex(slot.values[0] << slot.shift)
+        case Member():
+            raise AssertionError(f"kinds of frame have no values: {slot.name}")
+        case _:
+            assert_never(slot)
+
+
+def _bytes(part: Part) -> str:
+    """The bytes of a part; zeros for a check value."""
+    match part:
+        case ConstantPart():
+            return literal(part.data)
+        case LengthPart() | IdPart() | AddressPart() | CellPart() | EqualPart():
+            if part.integer.byteorder is not None:
+                return integers.to_bytes(part.integer, _local(part))
+            groups = [integers.group_out(_local(part), chunk) for chunk in part.integer.chunks]
+            return f"bytes(({', '.join(groups)}{',' if len(groups) == 1 else ''}))"
+        case CheckPart():
+            return f"bytes({part.size})"
+        case PayloadPart() | MarkPart() | BlocksPart():
+            raise AssertionError(f"{part.name} is beside a payload")
+        case _:
+            assert_never(part)
+
+
+# Reading a frame
+
+
+def _head_tests(envelope: Envelope) -> Iterator[tuple[str, str]]:
+    """The checks of a header, part by part, as far as received."""
+    for part in envelope.front:
+        start, end = envelope.offset(part), envelope.offset(part) + part.size
+        match part:
+            case ConstantPart():
+                yield f"not {literal(part.data)}.startswith(head[{start}:{end}])", '"no_frame", start'
+            case LengthPart():
+                seen = pieces.read(envelope, part, "head")
+                yield (
+                    f"len(head) >= {end} and not {part.least} <= {seen} <= {part.most}",
+                    f'"length", start + {end}',
+                )
+            case IdPart() | AddressPart() | CellPart() | EqualPart():
+                for test in pieces.wrong(envelope, part, "head"):
+                    yield f"len(head) >= {end} and {test}", '"no_frame", start'
+            case CheckPart():
+                pass
+            case MarkPart() | PayloadPart() | BlocksPart():
+                raise AssertionError(f"{part.name} is not a part of a header")
+            case _:
+                assert_never(part)
+
+
+def _tail_tests(envelope: Envelope, part: Part) -> Iterator[str]:
+    """Conditions that hold if a part after the payload is wrong."""
+    if isinstance(part, ConstantPart):
+        yield f"not frame[{-envelope.from_end(part)}:].startswith({literal(part.data)})"
+    yield from pieces.wrong(envelope, part, "frame")

@@ -1,0 +1,212 @@
+"""Second pass, kinds of frame: builds several frames, and checks that receivers can tell them apart."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import replace
+
+from qlinkgen.model.frame import ATTRIBUTE, DelimitedFrame, FrameKind, FrameKinds, Part
+from qlinkgen.model.message import Message
+from qlinkgen.schema.file_commands import AnswerSpec, StepMessageSpec
+from qlinkgen.schema.file_model import SchemaFile
+from qlinkgen.schema.frames import FrameBuilder
+from qlinkgen.schema.notation import shown
+from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.source import Path
+
+_RULE = "bad-kinds"
+#: Size up to which only answers may have a frame without a check value.
+_SHORT = 2
+
+
+def named_kinds(file: SchemaFile) -> Iterator[tuple[str, Path]]:
+    """The names of kinds that commands and messages state, with their places."""
+    answers: list[tuple[object, Path]] = [(file.defaults.response, ("defaults", "response"))]
+    answers += [(spec.response, ("commands", name, "response")) for name, spec in file.commands.items()]
+    stated: list[tuple[str | None, Path]] = [(file.defaults.frame, ("defaults",))]
+    stated += [(spec.frame, path) for spec, path in answers if isinstance(spec, AnswerSpec)]
+    for group in ("replies", "commands", "messages"):
+        stated += [(spec.frame, (group, name)) for name, spec in getattr(file, group).items()]
+    for name, command in file.commands.items():
+        path: Path = ("commands", name)
+        stated += [(spec.frame, (*path, "replies", key)) for key, spec in command.replies.items()]
+        for index, step in enumerate(command.steps or ()):
+            for key, message in (("send", step.send), ("receive", step.receive)):
+                if isinstance(message, StepMessageSpec):
+                    stated.append((message.frame, (*path, "steps", index, key)))
+    yield from ((kind, (*path, "frame")) for kind, path in stated if kind is not None)
+
+
+def check_kind_names(file: SchemaFile, report: Reporter) -> None:
+    """Check that the kinds of frame that commands and messages name exist."""
+    for name, path in named_kinds(file):
+        if name not in file.frames:
+            hint = did_you_mean(name, file.frames, f"the kinds are {listed(file.frames)}")
+            if not file.frames:
+                hint = "remove it; the protocol has one kind of frame"
+            report.error(_RULE, path, f"unknown kind of frame {shown(name)}", hint)
+
+
+def build_kinds(file: SchemaFile, builder: FrameBuilder, report: Reporter) -> FrameKinds | None:
+    """The kinds of frame; kinds that no message names are one family. None after an error."""
+    if "frame" in file.model_fields_set:
+        what, hint = "the protocol has a frame and kinds of frame", "write its frame as one of the kinds"
+        report.error(_RULE, ("frames",), what, hint, of_key=True)
+    named = {name for name, _ in named_kinds(file)}
+    families = list(dict.fromkeys(name if name in named else "" for name in file.frames))
+    found = []
+    for name, spec in file.frames.items():
+        frame = builder.kind(name, spec)
+        if frame is None:
+            report.taint(("frame",))
+            return None
+        found.append(FrameKind(name, frame, families.index(name if name in named else "")))
+    kinds = FrameKinds(tuple(found))
+    checker = _Checker(report)
+    for each in found:
+        checker.kind(each)
+    checker.starts(found)
+    checker.addresses(found)
+    for family in range(len(families)):
+        checker.family([each for each in found if each.family == family])
+    return kinds
+
+
+def family_frame(kinds: FrameKinds, family: int) -> DelimitedFrame:
+    """The largest frame of a family, with a payload of any size that one of its kinds has."""
+    members = [each.frame for each in kinds.kinds if each.family == family]
+    largest = max(members, key=lambda frame: frame.payload.max_size)
+    payload = replace(largest.payload, min_size=min(each.payload.min_size for each in members))
+    return replace(largest, parts=tuple(payload if p is largest.payload else p for p in largest.parts))
+
+
+def check_used(kinds: FrameKinds, messages: list[Message], report: Reporter) -> None:
+    """Check that each kind carries a message, and which kinds only answers may have."""
+    used = {each.name for message in messages for each in kinds.carrying(message.id)}
+    for kind in kinds.kinds:
+        if kind.name not in used:
+            what = f"no message has frame: {kind.name}"
+            hint = "remove it, or let a message name it"
+            report.error(_RULE, ("frames", kind.name), what, hint, of_key=True, needs=(("commands",),))
+        for message in messages:
+            asks = message.direction != "response" and kind in kinds.carrying(message.id)
+            if asks and kinds.address and not kind.frame.address:
+                what = (
+                    f"{message.name} is not an answer, and its frame has no address, which other kinds have"
+                )
+                hint = "let only responses and replies have this kind, or give it the address"
+                report.error(_RULE, ("frames", kind.name), what, hint, of_key=True)
+        size = sum(part.size for part in kind.frame.parts) + kind.frame.payload.max_size
+        if size > _SHORT or kind.frame.part("checksum"):
+            continue
+        for message in messages:
+            if message.direction != "response" and kind in kinds.carrying(message.id):
+                counted = f"{size} byte{'s' if size > 1 else ''}"
+                what = f"{message.name} is not an answer, and its frame of {counted} has no check value"
+                hint = "any byte of noise may be one; only a response or a reply has such a frame"
+                report.error("short-frame", ("frames", kind.name), what, hint, of_key=True)
+
+
+class _Checker:
+    """Checks what all back-ends rely on."""
+
+    def __init__(self, report: Reporter) -> None:
+        self._report = report
+
+    def _error(self, path: Path, what: str, hint: str) -> None:
+        self._report.error(_RULE, path, what, hint, of_key=True, needs=(path[:2],))
+
+    def kind(self, kind: FrameKind) -> None:
+        """Check that a kind has only what kinds may have."""
+        path: Path = ("frames", kind.name, "parts")
+        if not kind.frame.preamble:
+            first = kind.frame.parts[0].name
+            what = f"{kind.name} begins with {first}, not with constant bytes"
+            self._error((*path, first), what, "begin each kind with a constant that tells it from the others")
+        if kind.frame.idle:
+            what = f"an idle line ends frames of {kind.name}"
+            self._error(path, what, "remove it; a length or the message gives the end of a kind of frame")
+        if kind.frame.directed:
+            what = f"parts of {kind.name} are only in one direction"
+            self._error(path, what, "write two kinds, one for each direction")
+        for part in kind.frame.parts:
+            if wrong := _excess(part):
+                what = f"{part.name} of {kind.name} {wrong}, which kinds of frame do not have"
+                hint = "remove it, or describe the kind in a file of its own"
+                self._error((*path, part.name), what, hint)
+
+    def starts(self, kinds: list[FrameKind]) -> None:
+        """Check that no kind begins like another."""
+        for index, kind in enumerate(kinds):
+            for other in kinds[:index]:
+                one, two = kind.frame.preamble, other.frame.preamble
+                if one and two and (one.startswith(two) or two.startswith(one)):
+                    first, second = (each.hex(" ").upper() for each in (one, two))
+                    what = f"{kind.name} begins with {first}, {other.name} with {second}"
+                    hint = "a receiver cannot tell them apart; use other constants"
+                    self._error(("frames", kind.name), what, hint)
+
+    def addresses(self, kinds: list[FrameKind]) -> None:
+        """Check that the address is the same in all kinds that have one."""
+        having = [(kind, kind.frame.address) for kind in kinds if kind.frame.address]
+        for kind, address in having[1:]:
+            first = having[0][1]
+            assert first is not None
+            assert address is not None
+            if (address.name, address.bits) != (first.name, first.bits):
+                what = f"the address of {kind.name} is {address.name} of {address.bits} bits, "
+                what += f"that of {having[0][0].name} {first.name} of {first.bits}"
+                self._error(("frames", kind.name), what, "give both the same name and size")
+
+    def family(self, kinds: list[FrameKind]) -> None:
+        """Check kinds that carry the same messages: only constants, lengths and check values differ."""
+        first, *others = kinds
+        for kind in others:
+            if _kept(kind.frame) != _kept(first.frame):
+                what = f"{kind.name} and {first.name} carry the same messages, but have different parts"
+                hint = "let each message name its frame, or change only constants, lengths and check values"
+                self._error(("frames", kind.name), what, hint)
+                return
+        for kind in kinds if others else ():
+            repeated = {part.derivation.of for part in kind.frame.parts if part.derivation}
+            if (length := kind.frame.part("length")) and length.name in repeated:
+                what = f"a part of {kind.name} repeats its length"
+                self._error(("frames", kind.name), what, "let each message name its frame")
+            if (length := kind.frame.part("length")) is None or length.scale > 1:
+                what = f"no length of {kind.name} gives each size of its payload"
+                self._error(("frames", kind.name), what, "add one, or let each message name its frame")
+        sizes = sorted((kind.frame.payload.min_size, kind.frame.payload.max_size) for kind in kinds)
+        for (_, before), (low, _) in itertools.pairwise(sizes):
+            if low > before + 1:
+                what = f"no kind has a payload of {before + 1} bytes"
+                hint = "let the sizes of kinds that carry the same messages adjoin"
+                self._error(("frames", kinds[-1].name), what, hint)
+
+
+def _excess(part: Part) -> str:
+    """What kinds of frame do not have, "" if the part is right."""
+    if part.role == "terminator":
+        return "is a terminator"
+    if part.trim is not None:
+        return "is trimmed"
+    if any(bits.role == "value" for bits in part.bits):
+        return "holds a value of every frame"
+    if part.checksum and part.checksum.every:
+        return "has a value for each block"
+    if part.checksum and any(name.startswith(ATTRIBUTE) for name in part.checksum.over):
+        return "covers an attribute"
+    if part.checksum and part.checksum.otherwise is not None:
+        return "has a value for nothing"
+    return ""
+
+
+def _kept(frame: DelimitedFrame) -> list[object]:
+    """The parts that kinds of a family have in common, in wire order."""
+    own = ("constant", "length", "checksum")
+    alike: list[object] = [
+        replace(part, min_size=0, max_size=0, doc="", section="", confirmed=True)
+        for part in frame.parts
+        if part.role not in own
+    ]
+    return alike

@@ -1,0 +1,106 @@
+"""Second pass, messages of several kinds of frame: builds each message for the frames that carry it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from qlinkgen.model.frame import Frame, FrameKinds, PartBits
+from qlinkgen.model.message import Message
+from qlinkgen.model.transaction import Addressing, Bus
+from qlinkgen.schema.fields import FieldBuilder
+from qlinkgen.schema.file_base import Fact
+from qlinkgen.schema.file_commands import CommandSpec, MessageSpec
+from qlinkgen.schema.file_model import SchemaFile
+from qlinkgen.schema.frame_kinds import family_frame, named_kinds
+from qlinkgen.schema.frames import payload_bounds
+from qlinkgen.schema.messages import MessageBuilder, Written
+from qlinkgen.schema.report import Reporter, listed
+from qlinkgen.schema.source import Path
+from qlinkgen.schema.types import TypeBuilder
+
+
+class KindMessages:
+    """Builds messages, each with the builder of the family of kinds that carries it."""
+
+    def __init__(
+        self, file: SchemaFile, report: Reporter, types: TypeBuilder, kinds: FrameKinds, bus: Bus
+    ) -> None:
+        """``types`` are those of fields."""
+        self._report = report
+        self._kinds = kinds
+        self.places: dict[str, Path] = {}
+        self.id_places: dict[str, Path] = {}
+        self._builders: dict[int, MessageBuilder] = {}
+        self._families = {each.name: each.family for each in kinds.kinds}
+        for family in sorted({each.family for each in kinds.kinds}):
+            frame = family_frame(kinds, family)
+            fields = FieldBuilder(file, report, types, frame.payload.max_size)
+            builder = MessageBuilder(file, report, fields, frame, bus, base=kinds.base(family))
+            builder.places, builder.id_places = self.places, self.id_places
+            self._builders[family] = builder
+        named = {kind for kind, _ in named_kinds(file)}
+        self._shared = next((f for name, f in self._families.items() if name not in named), None)
+
+    @property
+    def addressed(self) -> bool:
+        """Whether any kind has an address."""
+        return self._kinds.address is not None
+
+    @property
+    def repeated(self) -> tuple[str, ...]:
+        """Values of the frame that answers repeat: kinds have no values."""
+        return ()
+
+    @property
+    def ways(self) -> PartBits | None:
+        """Values of the direction: kinds have none."""
+        return None
+
+    def directed(
+        self, name: str, spec: CommandSpec, layout: Written, *, addressing: Addressing, section: str
+    ) -> Message:
+        """Request or response of a command."""
+        return self._of(layout.kind, ("commands", name)).directed(
+            name, spec, layout, addressing=addressing, section=section
+        )
+
+    def reply(
+        self,
+        command: str,
+        spec: Fact,
+        layout: Written,
+        *,
+        addressing: Addressing,
+        direction: Literal["request", "response"] = "response",
+    ) -> Message:
+        """An answer other than the response, or a step; ``command`` is "" if it is that of all."""
+        return self._of(layout.kind, layout.path).reply(
+            command, spec, layout, addressing=addressing, direction=direction
+        )
+
+    def single(self, name: str, spec: MessageSpec) -> Message:
+        """A message without a response."""
+        return self._of(spec.frame, ("messages", name)).single(name, spec)
+
+    def _of(self, kind: str | None, path: Path) -> MessageBuilder:
+        """The builder of the messages of a kind."""
+        if kind in self._families:
+            return self._builders[self._families[kind or ""]]
+        if kind is None and self._shared is None:
+            what = f"{path[-1]} does not name the kind of its frame"
+            hint = f"add frame: {listed(self._families, 'or')}"
+            self._report.error("bad-kinds", path, what, hint, of_key=True, absent=True)
+        return self._builders[self._shared or 0]
+
+
+AnyMessages = MessageBuilder | KindMessages
+
+
+def message_builder(
+    file: SchemaFile, report: Reporter, types: TypeBuilder, frame: Frame | None, bus: Bus
+) -> AnyMessages:
+    """The builder of the messages of a file; ``frame`` is None if it could not be built."""
+    if isinstance(frame, FrameKinds):
+        return KindMessages(file, report, types, frame, bus)
+    fields = FieldBuilder(file, report, types, payload_bounds(file)[1])
+    return MessageBuilder(file, report, fields, frame, bus)

@@ -1,0 +1,118 @@
+"""Several kinds of frame in one protocol: which is sent, and which is found in a damaged stream."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from qlinkgen.plan import Plan, plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.dissect import dissect
+from qlinkgen.plan.reading import BadFrame
+from qlinkgen.plan.receive import Event, receiver
+from qlinkgen.schema import find, load
+
+_LOST = b"\x00\x16"
+
+
+@pytest.fixture(scope="module")
+def vesc() -> Plan:
+    return plan_of(load(find("vesc")))
+
+
+@pytest.fixture(scope="module")
+def mbus() -> Plan:
+    return plan_of(load(find("mbus")))
+
+
+def heard(plan: Plan, stream: bytes) -> list[tuple[str, int]]:
+    def called(event: Event) -> str:
+        return event.decoded.message.name if event.decoded else event.kind
+
+    return [(called(event), event.offset) for event in receiver(plan, "response").run(stream)]
+
+
+@pytest.mark.parametrize(
+    ("size", "start"), [(53, "02 36"), (254, "02 FF"), (255, "03 01 00"), (511, "03 02 00")]
+)
+def test_the_size_picks_the_kind(vesc: Plan, size: int, start: str) -> None:
+    wire = Codec(vesc).wrap("get_values.response", bytes(size))
+    assert wire.startswith(bytes.fromhex(start))
+    assert len(Codec(vesc).decode(wire, "response").payload) == size
+
+
+def test_the_greatest_frame_is_of_the_longest_kind(vesc: Plan) -> None:
+    by_name = vesc.by_name
+    assert by_name["get_values.response"].wire_size == 511 + 7
+    assert by_name["set_duty.request"].wire_size == 4 + 6
+    assert vesc.frame.max_wire == 511 + 7
+
+
+def test_a_long_frame_of_a_short_payload_is_none(vesc: Plan) -> None:
+    message = vesc.by_name["get_values.response"]
+    codec, long = Codec(vesc), message.frames[-1]
+    with pytest.raises(BadFrame, match="length"):
+        codec.decode(codec.join(message, codec.cells(message, bytes(99), frame=long), frame=long), "response")
+
+
+def test_ids_of_different_kinds_do_not_clash(mbus: Plan) -> None:
+    codec = Codec(mbus)
+    assert codec.wrap("initialise.request", b"", 1) == bytes.fromhex("10 40 01 41 16")
+    assert codec.wrap("ack", b"") == b"\xe5"
+    numbers = [(each.frames[-1].name, each.number) for each in mbus.messages]
+    assert ("short", 32) in numbers
+    assert ("ack", 0) in numbers
+    assert len({each.id for each in mbus.messages}) == len(numbers)
+    assert codec.decode(b"\xe5", "response").address is None
+
+
+@pytest.mark.parametrize(
+    ("wire", "kind"),
+    [
+        ("", "truncated"),
+        ("10 40 01", "truncated"),
+        ("11 40 01 41 16", "frame"),
+        ("10 40 01 42 16", "crc"),
+        ("10 41 01 42 16", "unknown"),
+        ("10 40 01 41 17", "frame"),
+        ("10 40 01 41 16 E5", "length"),
+        ("68 03 04 68 53 01 50 A4 16", "frame"),
+        ("68 03 03 69 53 01 50 A4 16", "frame"),
+        ("68 02 02 68 53 01 50 A4 16", "length"),
+    ],
+)
+def test_each_kind_is_judged_by_its_own_rules(mbus: Plan, wire: str, kind: str) -> None:
+    data = bytes.fromhex(wire)
+    with pytest.raises(BadFrame) as caught:
+        Codec(mbus).decode(data, "request")
+    assert caught.value.kind == kind
+    found = dissect(mbus, data, "request")
+    assert (found.kind, kind in {fault.kind for fault in found.faults}) == (kind, True)
+
+
+def test_frames_of_all_kinds_are_found_between_noise(mbus: Plan) -> None:
+    codec = Codec(mbus)
+    long = codec.wrap("read.response", bytes(20), 5)
+    stream = long + _LOST + b"\xe5" + long[:-3] + b"\xe5" + long
+    assert heard(mbus, stream) == [
+        ("read.response", 0),
+        ("ack", len(long) + 2),
+        ("frame", len(long) + 3),
+        ("ack", 2 * len(long)),
+        ("read.response", 2 * len(long) + 1),
+    ]
+
+
+def test_no_intact_frame_is_lost_after_a_corruption(vesc: Plan) -> None:
+    rng, codec = random.Random(1), Codec(vesc)
+    for _ in range(40):
+        payloads = [rng.randbytes(rng.choice((53, 60, 300))) for _ in range(5)]
+        frames = [codec.wrap("get_values.response", each) for each in payloads]
+        hit = bytearray(frames[2])
+        hit[rng.randrange(len(hit))] ^= 1 << rng.randrange(8)
+        frames[2] = bytes(hit)
+        # A corrupted length may announce bytes of a later frame until the stream ends.
+        events = receiver(vesc, "response").run(b"".join(frames))
+        found = [event.raw for event in events if event.decoded]
+        assert [each for each in frames if each in found] == [*frames[:2], *frames[3:]]

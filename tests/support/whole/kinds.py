@@ -1,0 +1,165 @@
+"""Random protocols with several kinds of frame: their parts, and which messages share kinds."""
+
+from __future__ import annotations
+
+import copy
+import random
+from dataclasses import dataclass, field
+from typing import Any
+
+from tests.support.whole.frames import Shape, draw_algorithm, order, width_type
+
+Doc = dict[str, Any]
+_LEADS = ("68", "10", "02", "A5 5A", "A5 A5", "24 4D", "24 58", "FF", "7E 01", "3A")
+_NAMES = ("short", "long", "ack", "command", "plain", "wide")
+_SIZES = (0, 4, 8, 16, 40, 120, 200)
+
+
+@dataclass
+class Family:
+    """Kinds that carry the same messages: one that messages name, or some that none names.
+
+    Attributes:
+        name: what messages write, "" if they write nothing.
+        ids: those in use.
+    """
+
+    shape: Shape
+    name: str
+    ids: set[int] = field(default_factory=set)
+
+    @property
+    def spec(self) -> Doc:
+        """What a message writes."""
+        return {"frame": self.name} if self.name else {}
+
+
+@dataclass
+class Kinds:
+    """The kinds of frame of a protocol."""
+
+    frames: Doc
+    families: list[Family]
+
+    @property
+    def addressed(self) -> bool:
+        """Whether any kind has an address."""
+        return any(each.shape.address_bits for each in self.families)
+
+
+def draw(rng: random.Random) -> Kinds:
+    """Two or three families of kinds, or one of several kinds."""
+    leads, names = rng.sample(_LEADS, len(_LEADS)), rng.sample(_NAMES, len(_NAMES))
+    address = ("node", rng.choice(("u8", "u8", "u16"))) if rng.random() < 0.6 else ("", "")
+    frames: Doc = {}
+    families: list[Family] = []
+    shared = rng.random() < 0.5
+    for index in range(rng.choice((1, 2, 2, 3)) if shared else rng.choice((2, 2, 3))):
+        name, lead = names.pop(), leads.pop()
+        held = address if index == 0 or rng.random() < 0.7 else ("", "")
+        shape = _kind(rng, lead, held, variable=shared and index == 0)
+        frames[name] = {"parts": shape.frame["parts"]}
+        families.append(Family(shape, name))
+        if shared and index == 0:
+            families[0].name = ""
+            for _ in range(rng.choice((1, 1, 2))):
+                frames[names.pop()] = {"parts": _longer(rng, shape, leads.pop())}
+    if rng.random() < 0.4:
+        lead = leads.pop()
+        shape = Shape("kinds", {"parts": {"byte": lead}}, 0, 0, 0, families[0].shape.bus, has_length=False)
+        frames[names.pop()] = {"parts": {"byte": lead}}
+        families.append(Family(shape, next(reversed(frames))))
+    for each in families:
+        each.shape.bus = families[0].shape.bus
+    mixed = list(frames)
+    rng.shuffle(mixed)
+    return Kinds({name: frames[name] for name in mixed}, families)
+
+
+def _identified(rng: random.Random, *, variable: bool) -> tuple[Doc, list[tuple[str, int]], int]:
+    """Parts with the id of a message, the bits of its pieces, and all its bits."""
+    header = Doc()
+    id_bits = rng.choice((8, 8, 8, 16)) if variable or rng.random() < 0.85 else 0
+    pieces: list[tuple[str, int]] = []
+    if id_bits == 16 and rng.random() < 0.5:
+        header |= {"group": {"role": "message", "type": "u8"}, "code": {"role": "message", "type": "u8"}}
+        pieces = [("group", 8), ("code", 8)]
+    elif id_bits == 8 and rng.random() < 0.3:
+        bits = {"code": {"at": "0..4", "role": "message"}, "fixed": {"at": "6..7", "const": rng.randrange(4)}}
+        header["head"], id_bits, pieces = {"type": "u8", "bits": bits}, 5, [("code", 5)]
+    elif id_bits:
+        header["code"] = {"role": "message", "type": f"u{id_bits}", **order(rng)}
+    return header, pieces, id_bits
+
+
+def _kind(rng: random.Random, lead: str, address: tuple[str, str], *, variable: bool) -> Shape:
+    """A kind of frame; `variable`: it has a length, and a payload of any size up to a limit."""
+    has_length = variable or rng.random() < 0.5
+    header, pieces, id_bits = _identified(rng, variable=variable)
+    if address[0]:
+        header[address[0]] = {"role": "address", "type": address[1], **order(rng)}
+    if has_length:
+        header["length"] = {"type": rng.choice(("u8", "u8", "u16")), **order(rng)}
+    names = list(header)
+    rng.shuffle(names)
+    parts: Doc = {"start": lead} | {name: header[name] for name in names}
+    if has_length and not variable and rng.random() < 0.4:
+        parts["again"] = {"type": parts["length"]["type"], "equals": "length", **_same_order(parts["length"])}
+    if rng.random() < 0.3:
+        parts["second"] = rng.choice((lead, "55"))
+    most = rng.choice(_SIZES) if not variable else rng.choice((2, 8, 20, 60))
+    if most or rng.random() < 0.5:
+        parts["data"] = {"role": "payload", "size": f"0..{most}"}
+    else:
+        most, has_length = 0, False
+        parts.pop("length", None)
+        parts.pop("again", None)
+    if has_length:
+        _counted(rng, parts)
+    _checked(rng, parts)
+    if rng.random() < 0.4:
+        parts["stop"] = rng.choice(("16", "03", "0D 0A"))
+    shape = Shape(
+        "kinds", {"parts": parts}, 0, most, id_bits, rng.choice(("master_slave", "host")), has_length
+    )
+    shape.address_name, shape.address_bits = address[0], int(address[1][1:] or 0)
+    shape.pieces = pieces
+    return shape
+
+
+def _same_order(spec: Doc) -> Doc:
+    return {key: spec[key] for key in ("byteorder",) if key in spec}
+
+
+def _counted(rng: random.Random, parts: Doc) -> None:
+    """What the length counts."""
+    names = [name for name in parts if name == "data" or rng.random() < 0.3]
+    parts["length"]["counts"] = names if len(names) > 1 else names[0]
+
+
+def _checked(rng: random.Random, parts: Doc) -> None:
+    """Check values, mostly one over the parts after the first."""
+    if rng.random() < 0.85:
+        found, width = draw_algorithm(rng)
+        covered = [name for name in parts if rng.random() < 0.8] or [next(iter(parts))]
+        parts["crc"] = {"type": width_type(width), "algorithm": found, "over": covered, **order(rng)}
+    if "crc" in parts and rng.random() < 0.15:
+        found, width = draw_algorithm(rng)
+        covered = [name for name in parts if rng.random() < 0.5] or ["crc"]
+        parts["also"] = {"type": width_type(width), "algorithm": found, "over": covered}
+
+
+def _longer(rng: random.Random, shape: Shape, lead: str) -> Doc:
+    """Another kind for the same messages, with longer payloads; the shape then has room for them."""
+    parts: Doc = copy.deepcopy(shape.frame["parts"])
+    parts["start"] = lead
+    parts["length"]["type"] = rng.choice(("u16", "u24"))
+    low = rng.choice((0, shape.most + 1, shape.most // 2))
+    shape.most += rng.choice((1, 10, 100, 300))
+    parts["data"]["size"] = f"{low}..{shape.most}"
+    if "crc" in parts and rng.random() < 0.3:
+        found, width = draw_algorithm(rng)
+        parts["crc"] |= {"type": width_type(width), "algorithm": found}
+    if rng.random() < 0.3:
+        parts["last"] = "0A"
+    return parts
