@@ -201,6 +201,12 @@ class FieldBuilder:
                 place = (*path, field.name)
                 self._report.error("bad-count", place, what, hint, of_key=True, needs=(place, *counts))
                 self._report.taint(place)
+        ended = next((field for field in fields if field.terminated), None)
+        for field in fields if ended else ():
+            if _is_row(field.type) and not field.fixed:
+                what = f"{field.name} is packed and of variable size, beside a text with a terminator"
+                hint, place = "give it a fixed number of items", (*path, field.name)
+                self._report.error("bad-terminated", place, what, hint, of_key=True, needs=(place, path))
 
     def _check_later_counts(
         self, name: str, fields: Sequence[Field], path: Path, counts: Sequence[Path]

@@ -281,8 +281,11 @@ class MessageBuilder:
         self._check_size(message, path)
         if message.separator:
             check_separator(message, self._frame, path, self._report)
-        if message.empty_is_default and any(field.conditional for field in message.fields):
-            what = f"{message.name} has fields that may be absent, so an empty one is not all its defaults"
+        if message.empty_is_default and any(f.conditional or f.terminated for f in message.fields):
+            why = (
+                "fields that may be absent" if any(f.conditional for f in message.fields) else "a terminator"
+            )
+            what = f"{message.name} has {why}, so an empty one is not all its defaults"
             self._error("bad-condition", (*path[:-1], "empty_request"), what, "remove empty_request")
         if isinstance(self._frame, DelimitedFrame) and self._frame.payload.trim is not None:
             self._check_trim(message, path)

@@ -213,7 +213,10 @@ class FieldMaker:
         spec: Doc = {"switch": ref, "cases": cases}
         covered = len(keys) == 2 and isinstance(keys[0], str)
         if not covered:
-            spec["default"] = {} if rng.random() < 0.3 else self._case(room, last=room.open_end)[0]
+            case, size = ({}, 0) if rng.random() < 0.3 else self._case(room, last=room.open_end)
+            if size > room.left:
+                return
+            spec["default"] = case
         if not any(cases.values()) and not spec.get("default"):
             return
         made.insert(rng.randint(0, len(made)), tag)
@@ -764,6 +767,8 @@ class FieldMaker:
     def _row(self, name: str, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
         """A packed array of variable size, with a count of its items and perhaps one of its bytes."""
         rng = self.rng
+        if any("terminator" in each for _, each in made):
+            return
         kind, spec, bits = self._bits_in_a_row()
         most = min(rng.choice((1, 3, 8, 17, 40, 250)), (room.left - room.least - 6) * 8 // bits)
         if most < 2:
@@ -849,7 +854,8 @@ class FieldMaker:
         """A text that a character ends, before a field that takes the rest."""
         rng = self.rng
         most = min(rng.choice((1, 3, 8, 40)), room.left - room.least - 1)
-        if most < 1:
+        rows = any("packed" in spec and ".." in spec["type"] for _, spec in made if isinstance(spec, dict))
+        if most < 1 or rows:
             return
         low = rng.choice((0, 0, min(1, most - 1)))
         spec: Doc = {"type": f"text[{low}..{most}]", "terminator": rng.choice(("00", "0D", "20"))}

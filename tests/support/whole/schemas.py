@@ -261,7 +261,8 @@ class _Maker:
         counters = [name for name, spec in request.items() if spec in ("u8", "u16")]
         if counters and rng.random() < 0.4:
             command["repeat"] = {"counter": rng.choice(counters)}
-        absent = any(isinstance(spec, dict) and {"if", "optional"} & spec.keys() for spec in request.values())
+        varying = {"if", "optional", "switch", "terminator"}
+        absent = any(isinstance(spec, dict) and varying & spec.keys() for spec in request.values())
         distinct = "separator" not in command and shape.has_length and not shape.trimmed and not absent
         if distinct and request and not shape.least and rng.random() < 0.15:
             command["empty_request"] = "defaults"
