@@ -261,6 +261,8 @@ KNOWN = {
     "sum8": 0xDD,
     "sum8-inverted": 0x22,
     "sum8-zero": 0x23,
+    "sum8-carry": 0xDE,
+    "sum8-carry-inverted": 0x21,
     "xor8": 0x31,
     "sum16": 0x01DD,
     "sum16-inverted": 0xFE22,
@@ -278,6 +280,8 @@ def test_known_values_of_what_is_not_a_crc() -> None:
     assert find("adler").compute(b"Wikipedia") == 0x11E60398
     # ModbusASCII, :010300000002 FA; UBX poll of MON-VER, B5 62 0A 04 00 00 0E 34.
     assert find("sum8-zero").compute(bytes.fromhex("010300000002")) == 0xFA
+    # The example of the LIN specification 2.1, 2.8.3.
+    assert find("sum8-carry-inverted").compute(bytes.fromhex("4A5593E5")) == 0xE6
     assert find("fletcher-8").compute(bytes.fromhex("0A040000")).to_bytes(2, "little").hex() == "0e34"
 
 

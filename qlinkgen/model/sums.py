@@ -69,6 +69,7 @@ class Sum(_Register):
         form: the value for a sum.
         init: start of the sum.
         aliases: other names in use.
+        carry: every carry is added again.
     """
 
     kind: ClassVar[Literal["sum"]] = "sum"
@@ -78,10 +79,12 @@ class Sum(_Register):
     form: Form = "plain"
     init: int = 0
     aliases: tuple[str, ...] = ()
+    carry: bool = False
 
     def step(self, register: int, byte: int) -> int:
         """Return the sum with one more unit."""
-        return register + byte & self.mask
+        total = register + byte
+        return (total & self.mask) + (total >> self.width if self.carry else 0)
 
     def finish(self, register: int) -> int:
         """Return the value for the sum of all units."""
@@ -147,6 +150,8 @@ SUMS: tuple[Sum | Xor | Fletcher, ...] = (
     Sum("sum8", 8),
     Sum("sum8-inverted", 8, "inverted", aliases=("sum8-ones-complement",)),
     Sum("sum8-zero", 8, "zero", aliases=("sum8-twos-complement", "lrc-modbus-ascii")),
+    Sum("sum8-carry", 8, carry=True),
+    Sum("sum8-carry-inverted", 8, "inverted", carry=True),
     Sum("sum16", 16),
     Sum("sum16-inverted", 16, "inverted"),
     Sum("sum16-zero", 16, "zero"),

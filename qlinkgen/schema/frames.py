@@ -467,7 +467,9 @@ class FrameBuilder:
         )
         over = [name for name, part in specs.items() if part.told != "checksum"]
         checksum = self._parts.checksum(spec.model_copy(update={"over": over}), specs, place)
-        if checksum is not None and not isinstance(checksum.algorithm, catalogue.Sum):
+        if checksum is not None and not (
+            isinstance(checksum.algorithm, catalogue.Sum) and not checksum.algorithm.carry
+        ):
             what = f"the check value of a packet must be a sum, not {checksum.algorithm.name}"
             self._report.error("bad-packet", (*place, "algorithm"), what, "use sum16 or sum8")
             return None

@@ -89,8 +89,7 @@ def render(algorithm: Checksum, number: int = 1) -> CheckView:
     key = "check" if number == 1 else f"check_{number}"
     match algorithm:
         case Sum():
-            kind = unsigned_type(algorithm.width)
-            return _render_sum(key, algorithm, [f"return ({kind})(sum + byte);"], finished(algorithm))
+            return _render_sum(key, algorithm, _sum_step(algorithm), finished(algorithm))
         case Xor():
             return _render_sum(key, algorithm, ["return (uint8_t)(sum ^ byte);"], "sum")
         case Fletcher():
@@ -118,6 +117,15 @@ def _render_sum(key: str, algorithm: Sum | Xor | Fletcher, step: list[str], resu
         step=step,
         finished=result,
     )
+
+
+def _sum_step(algorithm: Sum) -> list[str]:
+    if algorithm.carry:
+        return [
+            "const uint16_t total = (uint16_t)((uint16_t)sum + byte);",
+            "return (uint8_t)((total & 0xFFU) + (total >> 8));",
+        ]
+    return [f"return ({unsigned_type(algorithm.width)})(sum + byte);"]
 
 
 def _fletcher_step(algorithm: Fletcher) -> list[str]:

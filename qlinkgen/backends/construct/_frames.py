@@ -73,10 +73,14 @@ class Sum(NamedTuple):
     width: int
     form: str = "plain"
     init: int = 0
+    #: Every carry is added again.
+    carry: bool = False
 
     def compute(self, data: Iterable[int]) -> int:
         """The check value of bytes or words."""
         total = self.init + sum(data)
+        if self.carry:
+            total = (total - 1) % 0xFF + 1 if total else 0
         if self.form != "plain":
             total = ~total if self.form == "inverted" else -total
         return total & (1 << self.width) - 1

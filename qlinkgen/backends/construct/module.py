@@ -226,7 +226,8 @@ def _algorithm(algorithm: catalogue.Checksum) -> Call:
     match algorithm:
         case catalogue.Sum():
             form = () if algorithm.form == "plain" else (algorithm.form,)
-            return Call("Sum", (algorithm.width, *form), init)
+            carry = (("carry", True),) if algorithm.carry else ()
+            return Call("Sum", (algorithm.width, *form), (*init, *carry))
         case catalogue.Xor():
             return Call("Xor", (), init)
         case catalogue.Fletcher():

@@ -289,6 +289,16 @@ def sum_of(name: str, width: int, form: str = "plain", *, init: int = 0) -> Chec
     return Checksum(name, lambda data, start: (start + sum(data)) & mask, init)
 
 
+def carried(name: str, form: str = "plain", *, init: int = 0) -> Checksum:
+    """The sum of the bytes in eight bits, to which every carry is added again; or "inverted"."""
+    flip = 0xFF if form == "inverted" else 0
+    return Checksum(name, lambda data, start: _folded(start + sum(data)) ^ flip, init)
+
+
+def _folded(total: int) -> int:
+    return (total - 1) % 0xFF + 1 if total else 0
+
+
 def xor_of(name: str, *, init: int = 0) -> Checksum:
     """The exclusive or of the bytes."""
     return Checksum(name, _xor, init)

@@ -477,6 +477,8 @@ def _algorithm(algorithm: Checksum) -> tuple[str, list[str]]:
     match algorithm:
         case Sum():
             form = [] if algorithm.form == "plain" else [f'"{algorithm.form}"']
+            if algorithm.carry:
+                return "carried", [name, *form, *init]
             return "sum_of", [name, str(algorithm.width), *form, *init]
         case Xor():
             return "xor_of", [name, *init]

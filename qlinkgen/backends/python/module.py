@@ -32,7 +32,17 @@ _STRUCT = ("Struct", "pack", "unpack", "unpack_from")
 _RECORD = "BaseRecord"
 #: Modules that are written only where used, in the order of their names.
 _SHARED: Mapping[str, Sequence[str]] = {
-    "_checks": ("Checksum", "adler", "crc", "find_crc", "fletcher", "sum_of", "wrong_check", "xor_of"),
+    "_checks": (
+        "Checksum",
+        "adler",
+        "carried",
+        "crc",
+        "find_crc",
+        "fletcher",
+        "sum_of",
+        "wrong_check",
+        "xor_of",
+    ),
     "_digits": ("BetweenRule", "decimal", "read_decimal", "read_hexadecimal", "start_of"),
     "_rchoices": ("ChoiceRule",),
     "_records": (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records"),

@@ -22,6 +22,7 @@ def catalogue() -> Mapping[str, Mapping[str, str]]:
 #: Bits of the check values that are not CRCs.
 _SUMS = {
     "sum8": 8, "sum8-inverted": 8, "sum8-zero": 8, "xor8": 8,
+    "sum8-carry": 8, "sum8-carry-inverted": 8,
     "sum16": 16, "sum16-inverted": 16, "sum16-zero": 16, "sum32": 32,
     "fletcher-8": 16, "fletcher-16": 16, "adler-32": 32,
 }  # fmt: skip
@@ -50,6 +51,8 @@ def compute(algorithm: Algorithm, data: Sequence[int], init: int | None = None) 
         return _crc(bytes(data), **{"refout": stated["refin"]} | stated)
     if algorithm.startswith("sum"):
         total = (init or 0) + sum(data)
+        while "carry" in algorithm and total > 0xFF:
+            total = (total & 0xFF) + (total >> 8)
         signed = ~total if algorithm.endswith("inverted") else -total if algorithm.endswith("zero") else total
         return signed & (1 << width(algorithm)) - 1
     if algorithm == "xor8":
