@@ -448,7 +448,7 @@ def _decoded_direction(plan: Plan, direction: Direction, ways: Ways) -> DecodedD
         by_id=_by_id(messages),
         readers_by_id=_by_id(messages, ".from_checked"),
         decode=ways.of("_decode", direction),
-        ways=[ways.of(name, direction) for name in ("_split", "_judge", "_MAX_FRAME")],
+        ways=[ways.of(name, direction) for name in ("_split", "_judge", "_MAX_FRAME", "_whole")],
     )
 
 

@@ -103,6 +103,8 @@ class ModuleView:
     public: Sequence[str]
     imports: Imports
     directed: bool
+    quick: bool
+    announced: bool
     frames_with: Mapping[str, str]
 
 
@@ -145,6 +147,8 @@ class Module:
             public=self._public(view, decoded_directions),
             imports=self._imports(list(views.values()), models),
             directed=plan.directed,
+            quick=all(isinstance(each, PartsView) and each.quick for each in views.values()),
+            announced=all(isinstance(each, PartsView) and each.announced for each in views.values()),
             frames_with={way: sections.ways.of("_frame_with", way) for way in views},
         )
         asked = replace(module, f=views.get("request", view))
