@@ -197,3 +197,18 @@ def test_check_value_as_digits() -> None:
         assert caught.value.kind == "crc"
     (header,) = c.generate(protocol, Options()).values()
     assert "0x37U : 0x30U" in header
+
+
+def test_a_line_of_texts_without_anything_else_leaves_no_variable_unused_in_c() -> None:
+    """As of a weighing indicator, which sends its state and weight."""
+    parts = _SCHEMA.index("    start:"), _SCHEMA.index("    data:")
+    text = _SCHEMA[: parts[0]] + _SCHEMA[parts[1] :].replace("    id: PUT\n", "")
+    fields = '      state: "text[2]"\n      weight: {type: i32, as: "decimal[8]", scale: 1/10}'
+    protocol, faults = loads(
+        text.replace("size: 0..80", "size: 1..80").format(fields=fields, more="doc: D."), "probe.yaml"
+    )
+    assert protocol, [str(fault) for fault in faults]
+    assert python.load(protocol).Put(state="ST", weight=-12.3).to_frame() == b"ST,-00012.3\r\n"
+    (header,) = c.generate(protocol, Options()).values()
+    scan = header.partition("probe_scan_(")[2].partition("\n}")[0]
+    assert "status" not in scan

@@ -805,7 +805,7 @@ def with_separator(message: Message, document: Doc) -> Message:
         return message
     ends = [each for each in document["frame"]["parts"].values() if isinstance(each, dict)]
     ends = [each for each in ends if each.get("role") == "terminator"]
-    end = b"".join(octets(each["value"]) for each in ends)
+    end = b"".join(each["text"].encode() if "text" in each else octets(each["value"]) for each in ends)
     barred = chosen.encode() + end
     slots = tuple(_filled(slot, barred) for slot in message.slots)
     return replace(message, slots=slots, separator=chosen.encode(), barred=barred)
