@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from construct import ConstructError
 
-from qlinkgen.backends import c, construct, python
+from qlinkgen.backends import c, construct, python, vectors
 from qlinkgen.backends.base import Options
 from qlinkgen.errors import Fault
 from qlinkgen.model.protocol import Protocol
@@ -135,6 +135,12 @@ def test_what_cannot_be_sent(protocol: Protocol, codec: Any, field: str, value: 
     assert caught.value.field == field
     with pytest.raises(ConstructError):
         construct.live(protocol).payload("put", FULL | {field: value})
+
+
+def test_vectors_have_no_separator_in_texts() -> None:
+    protocol, faults = loaded('      a: "text[40]"\n      b: "text[0..30]"')
+    assert protocol, [str(fault) for fault in faults]
+    assert vectors.generate(protocol, Options())
 
 
 def test_c_counts_texts_first(protocol: Protocol) -> None:

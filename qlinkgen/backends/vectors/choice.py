@@ -56,9 +56,12 @@ class Chance:
 _MASK = (1 << 64) - 1
 
 
-def _without(terminator: bytes) -> bytes | None:
-    """The table that replaces a byte of a text by its neighbour."""
-    return bytes.maketrans(terminator, bytes((terminator[0] ^ 1,))) if terminator else None
+def _without(barred: bytes) -> bytes | None:
+    """The table that replaces each byte that a text does not have by one near it."""
+    if not barred:
+        return None
+    near = next(each for each in (barred[0] ^ flip for flip in range(1, 0x80)) if each not in barred)
+    return bytes.maketrans(barred, bytes((near,)) * len(barred))
 
 
 class Rule:
@@ -114,7 +117,7 @@ class Rule:
             case BytesStep():
                 mask = 0x7F if step.text else 0xFF
                 octets = bytes(self._octet(i) & mask for i in range(self._count(step.length)))
-                octets = octets.translate(_without(step.terminator))
+                octets = octets.translate(_without(step.terminator + step.excluded))
                 return {step.name: step.stripped(octets)}
             case ItemsStep():
                 bits, count = self._bits(step.item), whole(step, self._count(step.length))
