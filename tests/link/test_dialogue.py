@@ -155,6 +155,39 @@ def test_all_answers_are_returned_in_their_order(loader: ModuleType) -> None:
     assert (reply.attempts, node.ends, slave.counters.answers) == (1, 1, 4)
 
 
+def test_acknowledgements_of_one_byte() -> None:
+    head, tail = SCHEMA.split("frame:\n")[0], SCHEMA.split("bus:")[1]
+    kinds = """\
+frames:
+  block:
+    parts:
+      start: 7E
+      code: {role: message, type: u8}
+      length: {type: u8, counts: [data]}
+      data: {role: payload, size: 0..20}
+      crc: {type: u16, algorithm: crc-16/modbus, over: [code, length, data]}
+  ack: {parts: {byte: 79}}
+  nack: {parts: {byte: 1F}}
+bus: {kind: master_slave, baud: 9600, response_within: 10 ms}
+defaults: {repeat: safe, frame: block}
+"""
+    tail = tail[tail.index("messages:") : tail.index("  confirm:")].replace(
+        "{id: 0x79, direction", "{frame: ack, direction"
+    )
+    tail = tail.replace("nack: {id: 0x1F, fields: {reason: u8}}", "nack: {frame: nack, fields: {}}")
+    protocol, faults = loads(head + kinds + tail, "loader.yaml")
+    assert protocol is not None, faults
+    codec = load_codec(protocol)
+    wire = Wire(baud=9600)
+    wire.attach(SlaveEngine(codec, GenericNode(codec), baud=9600, turnaround=0.003), "node")
+    master = BlockingMaster(MasterEngine(codec, Timing.of(codec, host_slack=SLACK)), VirtualPort(wire))
+    further = [codec.ReadPlace(start=1), codec.ReadAmount(count=1)]
+    *acknowledged, data = master.transact(Dialogue(codec.ReadRequest(), further)).response
+    assert acknowledged == [codec.Ack()] * 3
+    assert codec.Ack().to_frame() == b"\x79"
+    assert data == codec.ReadData(data=b"\0")
+
+
 def test_a_choice_in_a_step(loader: ModuleType) -> None:
     fields = "{kind: {type: u8, range: 1..2}, value: {switch: kind, cases: {1: u16, 2: u32}}}"
     protocol, faults = loads(
