@@ -34,9 +34,12 @@ def unsent(header: Header, message: MessagePlan, right: Right) -> Iterator[Unsen
 def _spoilt(header: Header, holders: Sequence[Holder], values: bytes) -> Iterator[tuple[str, bytes]]:
     """The values once with each number out of range."""
     at = 0
+    presences = [each.presence for each in holders if each.presence is not None and each.presence.slot]
+    # Another number selects another case, which the values do not have.
+    choosing = {test.value for each in presences for test in each.when}
     for step, size in zip(holders, value_sizes(header, holders, values), strict=True):
         own, after = values[at : at + size], values[at + size :]
-        if step.presence is not None:
+        if step.presence is not None or step.name in choosing:
             at += size
             continue
         if isinstance(step, ValueStep | Member):
