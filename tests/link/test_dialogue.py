@@ -156,7 +156,7 @@ def test_all_answers_are_returned_in_their_order(loader: ModuleType) -> None:
 
 
 def test_acknowledgements_of_one_byte() -> None:
-    head, tail = SCHEMA.split("frame:\n")[0], SCHEMA.split("bus:")[1]
+    head, tail = SCHEMA.split("frame:\n", maxsplit=1)[0], SCHEMA.split("bus:")[1]
     kinds = """\
 frames:
   block:
