@@ -14,7 +14,7 @@ from qlinkgen.model.types import Array, BitField, Bits, Blob, Length, Scalar
 
 @dataclass(frozen=True)
 class Layout:
-    """A named sequence of fields of fixed size, for records of messages."""
+    """A named sequence of fields, for records of messages."""
 
     kind: ClassVar = "record"
     name: str
@@ -25,8 +25,18 @@ class Layout:
 
     @cached_property
     def size(self) -> int:
-        """Size on the wire."""
-        return sum(each.max_size for each in self.fields)
+        """Maximum size on the wire."""
+        return greatest_size(self.fields)
+
+    @cached_property
+    def least(self) -> int:
+        """Minimum size on the wire."""
+        return sum(each.min_size for each in self.fields)
+
+    @cached_property
+    def fixed(self) -> bool:
+        """Whether the size is constant."""
+        return all(each.fixed for each in self.fields)
 
     @cached_property
     def values(self) -> tuple[Value, ...]:
@@ -51,11 +61,6 @@ class Record:
     layout: Layout
 
     @property
-    def size(self) -> int:
-        """Bytes on the wire."""
-        return self.layout.size
-
-    @property
     def required(self) -> bool:
         """Whether the caller must provide it."""
         return self.layout.required
@@ -69,16 +74,18 @@ class Records:
     length: Length
     #: The caller must provide the value: empty is not legal.
     required: bool = False
+    #: The array ends with the first record of which this holds; () for others.
+    last: Condition = ()
     #: Suffix for the name of its number of items.
     quantity: str = field(default="count", init=False)
 
     def size_of(self, number: int) -> int:
-        """Size of so many records."""
+        """Maximum size of so many records."""
         return number * self.layout.size
 
     def items_in(self, size: int) -> int:
         """Maximum number of records that fit a size."""
-        return size // self.layout.size
+        return size // self.layout.least
 
 
 FieldType = Scalar | Bits | Blob | Array | Record | Records
@@ -124,11 +131,15 @@ class Field:
     def full_min_size(self) -> int:
         """Minimum size on the wire where it is present."""
         match self.type:
-            case Blob() | Array() | Records():
+            case Blob() | Array():
                 return self.type.size_of(self.type.length.minimum)
+            case Records():
+                return self.type.length.minimum * self.type.layout.least
+            case Record():
+                return self.type.layout.least
             case Scalar():
                 return self.type.least_size
-            case Bits() | Record():
+            case Bits():
                 return self.type.size
             case _:
                 assert_never(self.type)
@@ -139,7 +150,9 @@ class Field:
         match self.type:
             case Blob() | Array() | Records():
                 return self.type.size_of(self.type.length.maximum)
-            case Scalar() | Bits() | Record():
+            case Record():
+                return self.type.layout.size
+            case Scalar() | Bits():
                 return self.type.size
             case _:
                 assert_never(self.type)
@@ -157,11 +170,19 @@ class Field:
     @property
     def fixed(self) -> bool:
         """Whether the size is constant."""
-        if self.conditional:
+        if self.conditional or self.walked:
             return False
         if isinstance(self.type, Scalar):
             return self.type.text is None or self.type.text.fixed
         return not isinstance(self.type, Blob | Array | Records) or self.type.length.fixed
+
+    @property
+    def walked(self) -> bool:
+        """Whether its records have to be read one by one to find its end."""
+        kind = self.type
+        return isinstance(kind, Record | Records) and (
+            not kind.layout.fixed or (isinstance(kind, Records) and bool(kind.last))
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,6 +60,8 @@ class Message:
     carries: bool = False
     #: The byte between fields, which are texts; b"" if there is none.
     separator: bytes = b""
+    #: What the frame allows, where all records together may be larger than that; None for others.
+    limit: int | None = None
 
     @cached_property
     def min_size(self) -> int:
@@ -71,7 +73,8 @@ class Message:
     @cached_property
     def max_size(self) -> int:
         """Maximum size of the payload."""
-        return separated_size(self.fields)[1] if self.separator else greatest_size(self.fields)
+        size = separated_size(self.fields)[1] if self.separator else greatest_size(self.fields)
+        return size if self.limit is None else min(size, self.limit)
 
     @property
     def fixed(self) -> bool:

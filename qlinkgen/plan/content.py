@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TypeAlias, assert_never
 
 from qlinkgen.model.integer import Integer, pack_row, unpack_row
@@ -146,7 +147,7 @@ def by_value(plan: PayloadPlan, found: Mapping[str, Raw]) -> dict[str, Raw]:
 
 
 def _pack_walked(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
-    data, left_out = b"", False
+    data, left_out, sizes = b"", False, _sizes(plan, values)
     numbers = {name: value for name, value in values.items() if isinstance(value, int)}
     counts = {run.name: 0 if values[run.name] is None else _count(run, values[run.name]) for run in plan.runs}
     for segment in plan.segments:
@@ -161,8 +162,23 @@ def _pack_walked(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
         for each in holders(segment.steps):
             if (values[each.name] is not None) != sent:
                 raise Unsendable(each.name, values[each.name])
-        data += b"".join(_packed(step, values, counts) for step in segment.steps) if sent else b""
+        data += (
+            b"".join(_packed(step, values, counts | sizes.get(step.name, {})) for step in segment.steps)
+            if sent
+            else b""
+        )
+    if len(data) > plan.most:
+        field = next(step for segment in plan.segments if (step := segment.records))
+        raise Unsendable(field.name, values[field.name])
     return data
+
+
+def _sizes(plan: PayloadPlan, values: Mapping[str, Raw]) -> dict[str, dict[str, int]]:
+    """What counts of bytes of walked records count, by the name of the count and of the records."""
+    runs = {each.run for each in plan.steps if isinstance(each, CountStep) and each.sized}
+    sizes = {name: len(_packed(plan.run(name), values, {})) for name in runs if values[name] is not None}
+    counts = [each for each in plan.steps if isinstance(each, CountStep) and each.sized]
+    return {each.name: {each.run: sizes.get(each.run, 0)} for each in counts}
 
 
 def default_of(each: Holder) -> Raw:
@@ -213,12 +229,23 @@ def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) ->
         case RecordStep():
             return _record(step.name, step.record, values[step.name])
         case RecordsStep():
-            _count(step, values[step.name])
-            records = values[step.name]
-            assert isinstance(records, list)
-            return b"".join(_record(f"{step.name}[{i}]", step.record, each) for i, each in enumerate(records))
+            return _packed_records(step, values[step.name])
         case _:
             assert_never(step)
+
+
+def _packed_records(step: RecordsStep, value: object) -> bytes:
+    _count(step, value)
+    assert isinstance(value, list)
+    if step.last and not _ends(step, value):
+        raise Unsendable(step.name, value)
+    return b"".join(_record(f"{step.name}[{i}]", step.record, each) for i, each in enumerate(value))
+
+
+def _ends(step: RecordsStep, records: Sequence[Mapping[str, Raw]]) -> bool:
+    """Whether the last record, and no other, ends the array."""
+    whole = [defaults(step.record.payload) | dict(each) for each in records]
+    return [step.ends(each) for each in whole] == [*[False] * (len(whole) - 1), True]
 
 
 def _record(name: str, record: RecordPlan, value: object) -> bytes:
@@ -298,18 +325,48 @@ def unpack(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
 
 
 def _unpack_walked(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
-    values: dict[str, Raw] = {}
+    values = _Values()
     try:
         for each in visit(plan, payload):
-            if each.data is None:
-                values |= {holder.name: None for holder in holders((each.step,))}
+            own = values.of(each.inside)
+            if each.walked and each.data is not None:
+                own.setdefault(each.step.name, [])  # an array without records
+            elif each.data is None:
+                own |= {holder.name: None for holder in holders((each.step,))}
             else:
-                values |= _unpacked(each.step, each.data, _counts_of(each.step, each.data), each.at)
+                own |= _unpacked_at(each, each.data)
     except Wrong as wrong:
-        raise BadContent("length", _public(plan, wrong.field), wrong.at) from None
+        raise BadContent("length", _public(plan, wrong.path), wrong.at) from None
     except BadContent as bad:
         raise BadContent(bad.kind, _public(plan, bad.field), bad.offset) from None
-    return by_value(plan, values)
+    return by_value(plan, values.of(()))
+
+
+class _Values:
+    """The values of a payload with walked records in it."""
+
+    def __init__(self) -> None:
+        self._records: dict[walk.Inside, dict[str, Raw]] = {(): {}}
+        self._arrays: dict[tuple[walk.Inside, str], list[dict[str, Raw]]] = {}
+
+    def of(self, inside: walk.Inside) -> dict[str, Raw]:
+        """The values of a record, which is new if it is read for the first time."""
+        if inside not in self._records:
+            outer, (name, index) = self.of(inside[:-1]), inside[-1]
+            self._records[inside] = {}
+            if index is None:
+                outer[name] = self._records[inside]
+            else:
+                outer[name] = array = self._arrays.setdefault((inside[:-1], name), [])
+                array.append(self._records[inside])
+        return self._records[inside]
+
+
+def _unpacked_at(visit: walk.Visit, data: bytes) -> dict[str, Raw]:
+    try:
+        return _unpacked(visit.step, data, _counts_of(visit.step, data), visit.at)
+    except BadContent as bad:
+        raise BadContent(bad.kind, visit.prefix + bad.field, bad.offset) from None
 
 
 def _public(plan: PayloadPlan, path: str) -> str:
@@ -330,7 +387,9 @@ def _counts_of(step: Step, data: bytes) -> Mapping[str, int]:
 def places(plan: PayloadPlan, payload: bytes) -> Iterator[tuple[Step, int]]:
     """The steps of a valid payload, zeros at its end included, and their offsets, without absent ones."""
     if plan.walked:
-        yield from ((each.step, each.at) for each in visit(plan, payload) if each.data is not None)
+        for each in visit(plan, payload):
+            if each.data is not None and not each.walked:
+                yield replace(each.step, name=each.prefix + each.step.name), each.at
         return
     counts = count_items(plan, payload)
     yield from ((step, step.place.front.value(counts)) for step in plan.steps)
@@ -379,11 +438,14 @@ def measure(plan: PayloadPlan, start: bytes) -> int:
 
 def _measure_walked(plan: PayloadPlan, start: bytes) -> int:
     try:
-        return walk.measure(plan, start)
+        size = walk.measure(plan, start)
     except Missing as missing:
         raise MoreNeeded(max(plan.least, missing.end), missing.end) from None
     except Wrong as wrong:
-        raise BadContent("length", wrong.field, wrong.at) from None
+        raise BadContent("length", wrong.path, wrong.at) from None
+    if size > plan.most:
+        raise BadContent("length")
+    return size
 
 
 def _learn(count: CountStep, payload: bytes, counts: Mapping[str, int]) -> int:

@@ -81,17 +81,18 @@ class Fields:
         at = 0
         try:
             for each in visit(self._plan, self._payload):
-                self._between(at, each.at)
-                at = each.at
-                if each.data is not None:
+                if each.data is None or not each.walked:
+                    self._between(at, each.at)
+                    at = each.at
+                if each.data is not None and not each.walked:
                     at += len(each.data)
-                    self._step(each.step, tuple(range(each.at, at)), len(each.data))
+                    self._step_in(each.prefix, each.step, range(each.at, at), len(each.data))
         except WrongSize as wrong:
             self.bad = self._sound
             for step in wrong.steps:
                 begin = wrong.at + step.place.front.fixed
                 at = min(max(at, begin + full_size(step)), len(self._payload))
-                self._step(step, tuple(range(min(begin, at), at)), full_size(step))
+                self._step_in(wrong.inside, step, range(min(begin, at), at), full_size(step))
         self._extra(at)
 
     def _between(self, at: int, begin: int) -> None:
@@ -126,6 +127,13 @@ class Fields:
                 return step.item_size * (max(0, left) // step.item_size if number is None else number)
             case _:
                 return least_size(step)
+
+    def _step_in(self, inside: str, step: Step, places: range, size: int) -> None:
+        """Add a step inside of walked records."""
+        spans, wrong = len(self.spans), len(self.wrong)
+        self._step(step, tuple(places), size)
+        self.spans[spans:] = [replace(each, inside=inside + each.inside) for each in self.spans[spans:]]
+        self.wrong[wrong:] = [replace(each, inside=inside + each.inside) for each in self.wrong[wrong:]]
 
     def _step(self, step: Step, places: tuple[int, ...], size: int) -> None:
         raw = bytes(self._payload[at] for at in places)

@@ -7,8 +7,8 @@ sizes are consistent, so a decoder reports `length` before `range`, in any order
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import assert_never
 
@@ -127,6 +127,8 @@ class CountStep:
     term: Term
     bounds: Within
     presence: Presence | None = None
+    #: It tells the bytes of records of variable size, not their number.
+    sized: bool = False
 
     @property
     def scale(self) -> int:
@@ -250,7 +252,7 @@ class ItemsStep:
 
 @dataclass(frozen=True)
 class RecordPlan:
-    """A record of fixed size: its steps, whose places count from its first byte.
+    """A record: its steps, whose places count from its first byte, or from that of their segment.
 
     Attributes:
         name: its name, which the class or struct of the record is named after.
@@ -262,8 +264,13 @@ class RecordPlan:
 
     @property
     def size(self) -> int:
-        """Bytes on the wire."""
+        """Bytes on the wire, if they are constant."""
         return self.payload.most
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """How it is walked; one segment if its size is constant."""
+        return self.payload.segments or (Segment(self.payload.steps, None, self.payload.most),)
 
 
 @dataclass(frozen=True)
@@ -280,6 +287,11 @@ class RecordStep:
         """Whether the caller must provide it."""
         return self.record.payload.required
 
+    @property
+    def walked(self) -> bool:
+        """Whether its size varies."""
+        return self.record.payload.walked
+
 
 @dataclass(frozen=True)
 class RecordsStep:
@@ -291,6 +303,8 @@ class RecordsStep:
     length: Length
     required: bool
     presence: Presence | None = None
+    #: The record of which this holds is the last one; () if something else tells the number.
+    last: tuple[Test, ...] = ()
 
     #: See ItemsStep.
     packed = None
@@ -298,8 +312,19 @@ class RecordsStep:
     quantity = "count"
 
     @property
+    def walked(self) -> bool:
+        """Whether its records have to be read one by one to find its end."""
+        return self.record.payload.walked or bool(self.last)
+
+    def ends(self, values: Mapping[str, object]) -> bool:
+        """Whether a record with these raw values is the last one."""
+        numbers = [(test, values[test.value]) for test in self.last]
+        return all(isinstance(number, int) and test.holds(number) for test, number in numbers)
+
+    @property
     def item_size(self) -> int:
-        """Bytes of one record."""
+        """Bytes of one record, which one of variable size does not have."""
+        assert not self.record.payload.walked
         return self.record.size
 
     @property
@@ -318,13 +343,13 @@ Holder = ValueStep | Member | RunStep | RecordStep
 
 @dataclass(frozen=True)
 class Segment:
-    """A part of a walked payload whose size is known when it is reached.
+    """A part of a walked payload whose size is known when it is reached, unless it has walked records.
 
     Attributes:
         steps: fields of fixed size that are always present; or one field that may be absent, or a run of
-            variable size. Their places count from the beginning of the segment.
+            variable size, or walked records. Their places count from the beginning of the segment.
         presence: what decides whether it is present, None if it always is.
-        size: its size if it is present, None for a run of variable size.
+        size: its size if it is present, None for a run of variable size and for walked records.
         rest: size of what follows a run that takes the rest of the payload, None for other segments.
     """
 
@@ -342,8 +367,14 @@ class Segment:
     @property
     def run(self) -> RunStep | None:
         """The run of variable size, None for other segments."""
-        (step,) = self.steps if self.size is None else (None,)
+        (step,) = self.steps if self.size is None and self.records is None else (None,)
         return step if isinstance(step, BytesStep | ItemsStep | RecordsStep) else None
+
+    @property
+    def records(self) -> RecordStep | RecordsStep | None:
+        """The walked records, None for other segments."""
+        step = self.steps[0] if len(self.steps) == 1 else None
+        return step if isinstance(step, RecordStep | RecordsStep) and step.walked else None
 
 
 # Numbers of items -------------------------------------------------------------------------------------------
@@ -449,7 +480,11 @@ class PayloadPlan:
 
     def sendable(self, run: RunStep) -> Within:
         """Numbers of items that can be sent: at most what each of its counts can hold."""
-        counts = [step for step in self.steps if isinstance(step, CountStep) and step.run == run.name]
+        counts = [
+            step
+            for step in self.steps
+            if isinstance(step, CountStep) and step.run == run.name and not step.sized
+        ]
         most = min([run.length.maximum, *(_countable(each) for each in counts)])
         return Within(run.length.minimum, most)
 
@@ -523,7 +558,9 @@ def value_name(each: Holder | Step) -> str:
 
 
 def full_size(step: Step) -> int:
-    """Size of a step of constant size, if it is present."""
+    """Size of a step of constant size, if it is present; the maximum of walked records."""
+    if isinstance(step, RecordsStep) and step.walked:
+        return step.length.maximum * step.record.payload.most
     return term_of(step).value(step.length.maximum) if isinstance(step, RunStep) else least_size(step)
 
 
@@ -532,10 +569,12 @@ def least_size(step: Step) -> int:
     match step:
         case ValueStep() | ConstantStep() | ReservedStep() | CountStep() | BitsStep():
             return step.integer.size
-        case BytesStep() | ItemsStep() | RecordsStep():
+        case BytesStep() | ItemsStep():
             return term_of(step).value(step.length.minimum)
+        case RecordsStep():
+            return step.length.minimum * step.record.payload.least
         case RecordStep():
-            return step.record.size
+            return step.record.payload.least
         case _:
             assert_never(step)
 
@@ -591,3 +630,30 @@ def all_records(payloads: Iterable[PayloadPlan]) -> tuple[RecordPlan, ...]:
     """The records in several payloads, each before those that contain it."""
     found = {each.name: each for payload in payloads for each in payload.records}
     return tuple(found.values())
+
+
+def renamed(segments: Iterable[Segment], suffix: str) -> tuple[Segment, ...]:
+    """Segments whose steps have a suffix, for the locals of records inside of others."""
+    return tuple(
+        replace(
+            each,
+            steps=tuple(_renamed(step, suffix) for step in each.steps),
+            presence=each.presence and replace(each.presence, when=renamed_tests(each.presence.when, suffix)),
+        )
+        for each in segments
+    )
+
+
+def renamed_tests(tests: Iterable[Test], suffix: str) -> tuple[Test, ...]:
+    """Tests of steps that have a suffix."""
+    return tuple(replace(test, value=test.value + suffix) for test in tests)
+
+
+def _renamed(step: Step, suffix: str) -> Step:
+    if isinstance(step, CountStep):
+        run = step.run + suffix
+        return replace(step, name=step.name + suffix, run=run, term=replace(step.term, run=run))
+    if isinstance(step, BitsStep):
+        members = tuple(replace(each, name=each.name + suffix) for each in step.members)
+        return replace(step, name=step.name + suffix, members=members)
+    return replace(step, name=step.name + suffix)

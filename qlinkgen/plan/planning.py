@@ -49,25 +49,29 @@ def payload_plan(message: Message, trim: int | None = None) -> PayloadPlan:
     """Plan the payload of a message; see `PayloadPlan` for ``trim``."""
     if message.separator:
         return _Planner(message.fields).separated(message)
-    plan = _Planner(message.fields).plan(empty_is_default=message.empty_is_default)
+    plan = _Planner(message.fields, message.limit).plan(empty_is_default=message.empty_is_default)
     return plan if trim is None else replace(plan, trim=trim, least=min(trim, plan.most))
 
 
 def record_plan(layout: Layout) -> RecordPlan:
     """Plan a record."""
-    return RecordPlan(layout.name, _Planner(layout.fields).plan())
+    planner = _Planner(layout.fields)
+    return RecordPlan(layout.name, planner.plan() if layout.fixed else planner.walked())
 
 
 class _Planner:
     """Walks the fields of one message or record."""
 
-    def __init__(self, fields: tuple[Field, ...]) -> None:
+    def __init__(self, fields: tuple[Field, ...], limit: int | None = None) -> None:
+        """``limit`` is the maximum size of all fields together, if it is less than their sizes allow."""
         self._all = fields
+        self._limit = limit
         self._fields = {field.name: field for field in fields}
 
     def plan(self, *, empty_is_default: bool = False) -> PayloadPlan:
-        if any(field.conditional or field.terminated for field in self._all):
-            return self._walked()
+        """The plan of the fields."""
+        if any(field.conditional or field.terminated or field.walked for field in self._all):
+            return self.walked()
         front, steps = Size(), []
         for index, field in enumerate(self._all):
             rest = self._all[index:]
@@ -96,14 +100,16 @@ class _Planner:
             separator=message.separator,
         )
 
-    def _walked(self) -> PayloadPlan:
+    def walked(self) -> PayloadPlan:
+        """The plan of fields whose places vary."""
         segments = tuple(self._segments())
+        most = greatest_size(self._all)
         return PayloadPlan(
             steps=tuple(step for segment in segments for step in segment.steps),
             sizing=(),
             size=Size(),
             least=sum(field.min_size for field in self._all),
-            most=greatest_size(self._all),
+            most=most if self._limit is None else min(most, self._limit),
             empty_is_default=False,
             segments=segments,
         )
@@ -128,13 +134,16 @@ class _Planner:
         presence = _presence(field)
         step = _present(self._step(field, Place(Size(), None)), presence)
         kind = field.type
-        if not isinstance(kind, Blob | Array | Records) or kind.length.fixed:
+        if isinstance(kind, Record) and field.walked:
+            return Segment((step,), presence, None)
+        if not isinstance(kind, Blob | Array | Records) or (kind.length.fixed and not field.walked):
             return Segment((step,), presence, field.max_size)
         if field.terminated:
             return Segment((step,), presence, None)
         # A field after the rest that may be absent is absent where the rest is present.
         always = tuple(each for each in after if not each.conditional)
-        return Segment((step,), presence, None, None if kind.length.counted_by else _size_of(always))
+        ends = kind.length.counted_by or kind.length.fixed or (isinstance(kind, Records) and kind.last)
+        return Segment((step,), presence, None, None if ends else _size_of(always))
 
     def _step(self, field: Field, place: Place) -> Step:
         kind = field.type
@@ -163,7 +172,9 @@ class _Planner:
             case Record():
                 return RecordStep(field.name, place, record_plan(kind.layout))
             case Records():
-                return RecordsStep(field.name, place, record_plan(kind.layout), kind.length, kind.required)
+                return RecordsStep(
+                    field.name, place, record_plan(kind.layout), kind.length, kind.required, last=kind.last
+                )
             case _:
                 assert_never(kind)
 
@@ -179,9 +190,15 @@ class _Planner:
                 counted = self._fields[run].type
                 assert isinstance(counted, Blob | Array | Records)
                 term = _term(run, counted) if unit == "bytes" else Term(run, 1)
-                term = replace(term, more=sum(self._fields[each].max_size for each in beside))
+                more = sum(self._fields[each].max_size for each in beside)
+                term = replace(term, more=more)
                 bounds = Within(term.value(counted.length.minimum), term.value(counted.length.maximum))
-                return CountStep(name, place, scalar.integer, run, term, bounds)
+                sized = unit == "bytes" and self._fields[run].walked
+                if sized:
+                    least, most = self._fields[run].full_min_size, self._fields[run].max_size
+                    most = most if self._limit is None else min(most, self._limit)
+                    bounds = Within(more + least, min(scalar.integer.maximum, more + most))
+                return CountStep(name, place, scalar.integer, run, term, bounds, sized=sized)
             case _:
                 assert_never(scalar.role)
 
@@ -243,7 +260,7 @@ def _term(name: str, kind: FieldType) -> Term:
         case Array():
             return Term(name, kind.item.bits, packed=True)
         case Records():
-            return Term(name, kind.layout.size)
+            return Term(name, kind.layout.size if kind.layout.fixed else 1)
         case Blob():
             return Term(name, 1)
         case Scalar() | Bits() | Record():

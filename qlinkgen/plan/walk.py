@@ -1,16 +1,18 @@
-"""Walks a payload in which fields may be absent: segment by segment, in wire order.
+"""Walks a payload in which the places of fields depend on values: segment by segment, in wire order.
 
 A segment is read in one pass: its size is checked first, then its values in wire order, a count last of all
-by what it counts; so an illegal value is found before missing bytes of a later segment. Bytes after the last
-segment are a wrong size.
+by what it counts; so an illegal value is found before missing bytes of a later segment. Records of variable
+size are walked one after the other in the same way. Bytes after the last segment are a wrong size.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Generator, Iterator, Mapping
 from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen.model.condition import Test
+from qlinkgen.plan.expr import Size
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -36,6 +38,7 @@ class Wrong(ValueError):
         field: the field that is missing or counted wrong, "" if bytes are left.
         at: its offset.
         steps: those of the segment that is cut short.
+        inside: the record that they are inside of, as a path that ends with a dot.
     """
 
     def __init__(self, field: str, at: int, steps: tuple[Step, ...] = ()) -> None:
@@ -44,6 +47,12 @@ class Wrong(ValueError):
         self.field = field
         self.at = at
         self.steps = steps
+        self.inside = ""
+
+    @property
+    def path(self) -> str:
+        """The field with the record that it is inside of."""
+        return self.inside + self.field if self.field else ""
 
 
 class Missing(Exception):
@@ -64,6 +73,21 @@ def present(presence: Presence | None, numbers: Mapping[str, int], left: int) ->
     return all(test.holds(numbers[test.value]) for test in presence.when)
 
 
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """What is known of walked records before they are read.
+
+    Attributes:
+        number: their number, None if they fill their bytes; the maximum if the last one tells.
+        limit: the offset that they may extend to.
+        exact: they end there.
+    """
+
+    number: int | None
+    limit: int
+    exact: bool
+
+
 class Walk:
     """The state of a walk: what has been learned from earlier segments.
 
@@ -72,9 +96,12 @@ class Walk:
         counts: numbers of items of runs, as far as they have counts.
     """
 
-    def __init__(self, plan: PayloadPlan) -> None:
-        """Begin at the first segment."""
-        self._tested = {test.value for each in plan.segments if each.presence for test in each.presence.when}
+    def __init__(self, segments: Collection[Segment], last: Collection[Test] = ()) -> None:
+        """Begin at the first segment; ``last`` tests values of the record."""
+        tests = [test for each in segments if each.presence for test in each.presence.when]
+        self._tested = {test.value for test in (*tests, *last)}
+        self._last = tuple(last)
+        self._sizes: dict[str, int] = {}
         self.numbers: dict[str, int] = {}
         self.counts: dict[str, int] = {}
 
@@ -99,6 +126,25 @@ class Walk:
             raise Wrong(run.name, at, segment.steps)
         return size
 
+    def extent(self, segment: Segment, step: RecordStep | RecordsStep, at: int, end: int) -> Extent:
+        """What is known of walked records at ``at`` before they are read. Raises Wrong."""
+        if isinstance(step, RecordStep):
+            return Extent(1, end, exact=False)
+        if step.last or step.fixed:
+            return Extent(step.length.maximum, end, exact=False)
+        number, size = self.counts.get(step.name), self._sizes.get(step.name)
+        if segment.rest is None and size is None:
+            return Extent(number, end, exact=False)
+        limit = at + size if size is not None else end - (segment.rest or Size()).value(self.counts)
+        if not at <= limit <= end:
+            raise Wrong(step.name, at)
+        return Extent(number, limit, exact=True)
+
+    @property
+    def last(self) -> bool:
+        """Whether the record ends its array."""
+        return bool(self._last) and all(test.holds(self.numbers[test.value]) for test in self._last)
+
     def learn(self, step: Step, data: bytes, at: int) -> None:
         """Note the numbers of a step at ``at`` that later segments need. Raises Wrong for a wrong count."""
         match step:
@@ -121,6 +167,11 @@ class Walk:
             self.numbers[name] = number
 
     def _count(self, step: CountStep, number: int, at: int) -> None:
+        if step.sized:
+            size = self._sizes.setdefault(step.run, number - step.term.more)
+            if size != number - step.term.more or not step.bounds.holds(number):
+                raise Wrong(step.name, at)
+            return
         if step.run in self.counts:
             if number != step.term.value(self.counts[step.run]):
                 raise Wrong(step.name, at)
@@ -137,11 +188,16 @@ class Walk:
             case BitsStep():
                 return any(member.name in self._tested for member in step.members)
             case CountStep():
-                return step.run not in self.counts
+                return step.run not in (self._sizes if step.sized else self.counts)
             case ConstantStep() | ReservedStep() | BytesStep() | ItemsStep() | RecordStep() | RecordsStep():
                 return False
             case _:
                 assert_never(step)
+
+
+#: Walked records inside each other: names, with indices in an array.
+Inside = tuple[tuple[str, int | None], ...]
+Walkable = RecordStep | RecordsStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,30 +208,37 @@ class Visit:
         step: the step.
         at: its offset, or that of the next step if it is absent.
         data: its bytes, None if it is absent.
+        inside: the walked records that it is inside of: names, with indices in an array.
     """
 
     step: Step
     at: int
     data: bytes | None
+    inside: Inside = ()
+
+    @property
+    def walked(self) -> bool:
+        """Whether its records have been visited before."""
+        return isinstance(self.step, RecordStep | RecordsStep) and self.step.walked
+
+    @property
+    def prefix(self) -> str:
+        """What it is inside of, as a path."""
+        return "".join(map(inner_path, self.inside))
+
+
+def inner_path(place: tuple[str, int | None]) -> str:
+    """A record as the beginning of a path: ``options[2].``."""
+    name, index = place
+    return f"{name}." if index is None else f"{name}[{index}]."
 
 
 def visit(plan: PayloadPlan, payload: bytes) -> Iterator[Visit]:
-    """The steps of a payload, each before its value is used to find later ones. Raises Wrong."""
-    walk, at = Walk(plan), 0
-    for segment in plan.segments:
-        if not present(segment.presence, walk.numbers, len(payload) - at):
-            yield from (Visit(step, at, None) for step in segment.steps)
-            continue
-        if segment.terminator:
-            size = _terminated(segment, payload, at)
-        else:
-            size = walk.size(segment, at, len(payload) - at)
-        for step in segment.steps:
-            begin = at + step.place.front.fixed
-            data = payload[begin : begin + (size if segment.size is None else full_size(step))]
-            yield Visit(step, begin, data)
-            walk.learn(step, data, begin)
-        at += size
+    """The steps of a payload, each before its value is used to find later ones. Raises Wrong.
+
+    Walked records come after the steps in them.
+    """
+    at = yield from _Visitor(payload).fields(plan.segments, Walk(plan.segments), 0, len(payload))
     if at != len(payload):
         raise Wrong("", at)
 
@@ -190,11 +253,74 @@ def _terminated(segment: Segment, payload: bytes, at: int) -> int:
     return count + 1
 
 
+#: The steps of a part of the payload; returns the offset of its end.
+_Visits = Generator[Visit, None, int]
+
+
+class _Visitor:
+    """Visits the steps of one payload."""
+
+    def __init__(self, payload: bytes) -> None:
+        self._payload = payload
+        self._inside: Inside = ()
+
+    def fields(self, segments: Collection[Segment], walk: Walk, at: int, end: int) -> _Visits:
+        """The steps of a message or record that begins at ``at`` and ends at ``end`` at the latest."""
+        for segment in segments:
+            if not present(segment.presence, walk.numbers, end - at):
+                yield from (Visit(step, at, None, self._inside) for step in segment.steps)
+                continue
+            if segment.records is not None:
+                at = yield from self._records(segment, segment.records, walk, at, end)
+                continue
+            if segment.terminator:
+                size = _terminated(segment, self._payload, at)
+            else:
+                size = walk.size(segment, at, end - at)
+            for step in segment.steps:
+                begin = at + step.place.front.fixed
+                data = self._payload[begin : begin + (size if segment.size is None else full_size(step))]
+                yield Visit(step, begin, data, self._inside)
+                walk.learn(step, data, begin)
+            at += size
+        return at
+
+    def _records(self, segment: Segment, step: Walkable, walk: Walk, at: int, end: int) -> _Visits:
+        begin, index, ended = at, 0, False
+        extent = walk.extent(segment, step, at, end)
+        while not ended and (at < extent.limit if extent.number is None else index < extent.number):
+            if isinstance(step, RecordsStep) and index == step.length.maximum:
+                raise Wrong(step.name, at)
+            own = Walk(step.record.segments, step.last if isinstance(step, RecordsStep) else ())
+            place = (step.name, index if isinstance(step, RecordsStep) else None)
+            self._inside = (*self._inside, place)
+            try:
+                at = yield from self.fields(step.record.segments, own, at, extent.limit)
+            except Wrong as wrong:
+                wrong.inside = inner_path(place) + wrong.inside
+                raise
+            self._inside = self._inside[:-1]
+            index, ended = index + 1, own.last
+        if isinstance(step, RecordsStep) and (
+            index < step.length.minimum or (extent.exact and at != extent.limit) or ended != bool(step.last)
+        ):
+            raise Wrong(step.name, at)
+        yield Visit(step, begin, self._payload[begin:at], self._inside)
+        return at
+
+
 def measure(plan: PayloadPlan, start: bytes) -> int:
     """The size of the payload that begins with ``start``. Raises Missing, or Wrong for a wrong count."""
-    walk, at = Walk(plan), 0
-    for segment in plan.segments:
+    return _measured(plan.segments, Walk(plan.segments), start, 0)
+
+
+def _measured(segments: Collection[Segment], walk: Walk, start: bytes, at: int) -> int:
+    """The offset of the end of a message or record that begins at ``at``."""
+    for segment in segments:
         if not present(segment.presence, walk.numbers, 1):
+            continue
+        if segment.records is not None:
+            at = _measured_records(segment, segment.records, walk, start, at)
             continue
         for step in segment.steps:
             if walk.decides(step):
@@ -205,4 +331,18 @@ def measure(plan: PayloadPlan, start: bytes) -> int:
                     raise Missing(end)
                 walk.learn(step, start[begin:end], begin)
         at += walk.size(segment, at, 1 << 32)
+    return at
+
+
+def _measured_records(segment: Segment, step: Walkable, walk: Walk, start: bytes, at: int) -> int:
+    extent = walk.extent(segment, step, at, 1 << 32)
+    if extent.exact:
+        return extent.limit
+    for _ in range(extent.number or 0):
+        own = Walk(step.record.segments, step.last if isinstance(step, RecordsStep) else ())
+        at = _measured(step.record.segments, own, start, at)
+        if own.last:
+            return at
+    if isinstance(step, RecordsStep) and step.last:
+        raise Wrong(step.name, at)
     return at

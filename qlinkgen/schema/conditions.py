@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from qlinkgen.model.condition import Condition, Test, exclusive, turning_points
-from qlinkgen.model.fields import Field, Records, Value, values_of
+from qlinkgen.model.fields import Field, Layout, Record, Records, Value, values_of
 from qlinkgen.model.types import Array, Blob, Count, Enum, Float, Scalar
 from qlinkgen.schema.file_fields import Fields
+from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TestText, Wanted, shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
@@ -29,7 +30,8 @@ class ConditionBuilder:
     def build(self, fields: Sequence[Field]) -> list[Field]:
         """The fields with their conditions, checked against each other."""
         # Below, each field is compared with the others, which takes long for thousands of them.
-        if not any(self._specs[field.name].when or self._specs[field.name].optional for field in fields):
+        specs = [self._specs[field.name] for field in fields]
+        if not any(field.walked for field in fields) and not any(s.when or s.optional for s in specs):
             return list(fields)
         found: list[Field] = []
         for field in fields:
@@ -40,8 +42,8 @@ class ConditionBuilder:
         self._check_cases(found)
         for field in () if self._separated else found:
             self._check(field, found)
-            if any(each.conditional for each in found) and _is_packed_run(field):
-                what = f"{field.name} is packed and of variable size, in a message whose fields may be absent"
+            if any(each.conditional or each.walked for each in found) and _is_packed_run(field):
+                what = f"{field.name} is packed and of variable size, beside fields whose place varies"
                 hint = "give it a fixed number of items"
                 self._report.error(_RULE, (*self._path, field.name), what, hint, of_key=True)
         return found
@@ -173,7 +175,7 @@ class ConditionBuilder:
                 self._error(
                     field.name if field.conditional else count.name, "if", what, "give both the same if"
                 )
-        if not _is_run(field) or counts:
+        if not _is_run(field) or counts or (isinstance(field.type, Records) and field.type.last):
             return
         crossing = (each for each in after if each.conditional and not exclusive(field.when, each.when))
         if not field.optional and (later := next(crossing, None)):
@@ -186,13 +188,37 @@ class ConditionBuilder:
         if field.when:
             what, hint = f"{field.name} has a condition, so it is not optional", "remove one of them"
             self._error(field.name, "optional", what, hint)
-        elif _is_run(field) or not tuple(values_of((field,))):
+        elif _is_run(field) or field.walked or not tuple(values_of((field,))):
             what = f"{field.name} cannot be optional"
             self._error(field.name, "optional", what, "use it on fields of fixed size that have a value")
         elif later := next((each for each in after if not each.optional), None):
             what = f"{later.name} follows {field.name}, which may be left out"
             hint = f"make {later.name} optional too, or move it before {field.name}"
             self._error(field.name, "optional", what, hint)
+
+
+class EndBuilder(ConditionBuilder):
+    """Builds the condition that the last record of an array meets."""
+
+    def __init__(self, layout: Layout, location: Location) -> None:
+        """``location`` is that of the array."""
+        super().__init__({}, location.path, location.report)
+        self._location = location
+        self._layout = layout
+
+    def tests(self, texts: Sequence[TestText]) -> Condition:
+        """The tests of values of a record."""
+        return tuple(test for text in texts for test in self._test(self._holder, text, self._layout.fields))
+
+    @property
+    def _holder(self) -> Field:
+        return Field(f"the last {self._layout.name}", Record(self._layout))
+
+    def _error(self, field: str, key: str, what: str, hint: str) -> None:  # noqa: ARG002 - as in the base
+        what = what.replace(" with a value before it", " with a value")
+        what = what.replace(f"whether {field} is present", f"which {self._layout.name} is the last one")
+        hint = hint.replace("earlier fields", "fields")
+        self._location.key_fault("bad-record", "last", what, hint)
 
 
 def _counts(field: Field) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from qlinkgen.model.condition import exclusive
-from qlinkgen.model.fields import Field, FieldType, Records, greatest_size
+from qlinkgen.model.fields import Field, FieldType, Record, Records, greatest_size
 from qlinkgen.model.types import Array, Blob, Count, Scalar
 from qlinkgen.schema.conditions import ConditionBuilder
 from qlinkgen.schema.counted import with_counts
@@ -59,6 +59,7 @@ class FieldBuilder:
         fields = self._counted(fields, path, asked)
         if not separated:
             self._check_open_ends(fields, path)
+        self._check_mixed(fields, path)
         return tuple(self._bounded(fields, path, separators=len(fields) - 1 if separated else 0))
 
     def _check_text(self, kind: FieldType, path: Path) -> None:
@@ -143,18 +144,27 @@ class FieldBuilder:
             self._report.error("bad-count", path, what, "remove the count, or the terminator", needs=needs)
             self._report.taint(path)
             return False
-        if target is None or not isinstance(target.type, Blob | Array | Records) or target.type.length.fixed:
+        if target is not None and isinstance(target.type, Record | Records) and target.walked:
+            if not _is_countable(target.type):
+                what = f"{field.name} cannot count {target.name}, whose end its records tell"
+                self._report.error("bad-count", path, what, "remove the count", needs=needs)
+                self._report.taint(path)
+                return False
+        elif target is None or not _is_countable(target.type):
             known = [name for name, other in later.items() if not other.fixed]
             hint = did_you_mean(count.run, known, f"fields of variable size: {listed(known)}")
             what = f"{field.name} is not followed by a field {shown(count.run)} of variable size"
             self._report.error("bad-count", path, what, hint, needs=needs)
             self._report.taint(path)
             return False
+        assert isinstance(target.type, Blob | Array | Records)
         # An item of a byte string is a byte.
         unit = "bytes" if isinstance(target.type, Blob) else count.unit
         most = target.type.length.maximum
         most = target.type.size_of(most) if unit == "bytes" else most
         most += sum(each.max_size for each in fields if each.name in count.beside)
+        if target.walked and unit == "bytes":
+            return True  # an encoder refuses what it cannot count
         if most > scalar.maximum and (*path[:-2], target.name) not in self._types.unbounded:
             what = f"{field.name} counts up to {scalar.maximum}, but {target.name} has up to {most} {unit}"
             self._report.error(
@@ -182,7 +192,8 @@ class FieldBuilder:
             self._report.taint((*path, name))
         for field in open_fields:
             later = fields[fields.index(field) + 1 :]
-            ended = (each for each in later if each.terminated and not exclusive(each.when, field.when))
+            varied = (each for each in later if each.terminated or each.walked)
+            ended = (each for each in varied if not exclusive(each.when, field.when))
             if other := next(ended, None):
                 what = f"{field.name} takes the rest of the payload, before {other.name}, whose size varies"
                 both = ((*path, field.name), (*path, other.name), *counts)
@@ -190,6 +201,19 @@ class FieldBuilder:
                 self._report.error("two-open-ends", (*path, other.name), what, hint, of_key=True, needs=both)
         if open_ends:
             self._check_later_counts(open_ends[0], fields, path, counts)
+
+    def _check_mixed(self, fields: Sequence[Field], path: Path) -> None:
+        """Check that choices and texts with a terminator are not beside records of variable size."""
+        walked = next((each for each in fields if each.walked), None)
+        mixed = next((each for each in fields if each.slot or each.terminated), None)
+        if walked is None or mixed is None:
+            return
+        what = f"{mixed.slot or mixed.name} is beside {walked.name}, whose records vary in size"
+        if mixed is walked:
+            what = f"{mixed.slot} has a case with records that vary in size"
+        hint = f"write fields with if in place of {mixed.slot or mixed.name}, or a text with a count"
+        place = (*path, mixed.name)
+        self._report.error("bad-record", place, what, hint, of_key=True, needs=(place, path))
 
     def _check_packed(self, fields: Sequence[Field], path: Path) -> None:
         """Check that a packed array of variable size has a count."""
@@ -239,7 +263,9 @@ class FieldBuilder:
     def _room(self, field: Field, bounded: Sequence[Field]) -> int:
         """What the fields that may be present along with a field leave of the payload."""
         beside = [each for each in bounded if not exclusive(each.when, field.when)]
-        return self._payload_max - greatest_size(beside)
+        # Records of variable size may leave more, and an encoder refuses what the frame does not allow.
+        walked = sum(each.min_size for each in beside if each.walked)
+        return self._payload_max - walked - greatest_size(each for each in beside if not each.walked)
 
     def _filled(self, field: Field, room: int, fields: Sequence[Field], path: Path) -> Field:
         kind, place = field.type, (*path, field.name)
@@ -266,6 +292,13 @@ def _with_counter(field: Field, counter: str | None) -> Field:
     return replace(field, type=replace(kind, length=replace(kind.length, counted_by=counter)))
 
 
+def _is_countable(kind: FieldType) -> bool:
+    """Whether a count may tell the number of items, or their bytes."""
+    if not isinstance(kind, Blob | Array | Records) or kind.length.fixed:
+        return False
+    return not isinstance(kind, Records) or not kind.last
+
+
 def _is_row(kind: FieldType) -> bool:
     return isinstance(kind, Array) and kind.packed is not None
 
@@ -277,4 +310,5 @@ def is_open(field: Field) -> bool:
         and not field.type.length.fixed
         and not field.type.length.counted_by
         and not field.terminated
+        and not (isinstance(field.type, Records) and field.type.last)
     )

@@ -143,6 +143,9 @@ class FieldSpec(Fact, Lifetime):
         default=None, alias="if", description="Present only where earlier fields have these values"
     )
     optional: StrictBool = Field(default=False, description="May be left out, with all fields after it")
+    last: AnyCondition | None = Field(
+        default=None, description="An array of records ends with the first one that has these values"
+    )
     _case: CaseOf | None = PrivateAttr(default=None)
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from typing import Literal, NamedTuple, assert_never
 
 from qlinkgen.model.fields import Field, Record, Records
@@ -120,8 +121,7 @@ class MessageBuilder:
             seeds=self._seeds.of_command(name, number),
             separator=self._separator(layout),
         )
-        self._add(message, layout)
-        return message
+        return self._added(message, layout)
 
     def _echoed(self, direction: Direction) -> tuple[str, ...]:
         """Values of the frame that an answer repeats."""
@@ -158,8 +158,7 @@ class MessageBuilder:
             seeds=self._seeds.of_command(command, number),
             separator=self._separator(layout),
         )
-        self._add(message, layout)
-        return message
+        return self._added(message, layout)
 
     def _separator(self, layout: Written) -> bytes:
         """The separator of a message, which may be that of the defaults; b"" without fields."""
@@ -192,10 +191,13 @@ class MessageBuilder:
         whose = "" if usual else name
         return self._base + self._ids.number(stated, direction, path, whose, way=layout.way)
 
-    def _add(self, message: Message, layout: Written) -> None:
+    def _added(self, message: Message, layout: Written) -> Message:
+        if any(field.walked for field in message.fields):
+            message = replace(message, limit=self._limits()[1])
         self.places[message.name] = layout.path
         self.id_places[message.name] = layout.number_path
         self._check(message, layout.path)
+        return message
 
     def single(self, name: str, spec: MessageSpec) -> Message:
         """A message without a response."""
@@ -221,7 +223,7 @@ class MessageBuilder:
             seeds=self._seeds.of(name, number, spec.attributes, ("messages", name)),
             separator=self._separator(layout),
         )
-        self._add(message, layout)
+        message = self._added(message, layout)
         if isinstance(self._frame, PacketFrame) and direction != "request":
             what = f"{name} is not the response to a request"
             hint = "add direction: request, or make it a command"
@@ -304,14 +306,16 @@ class MessageBuilder:
     def _error(self, rule: str, path: Path, what: str, hint: str) -> None:
         self._report.error(rule, path, what, hint, of_key=True, needs=(path, _FRAME))
 
-    def _check_size(self, message: Message, path: Path) -> None:
-        assert self._frame is not None
+    def _limits(self) -> tuple[int, int | None]:
+        """Minimum and maximum size of payloads in the frame."""
         if isinstance(self._frame, DelimitedFrame):
-            low, high = self._frame.payload.min_size, self._frame.payload.max_size
-        else:
-            low, high = 0, self._frame.payload_max
-            if self._file.frame.marked is not None:
-                low = self._file.frame.marked.payload[0]
+            return self._frame.payload.min_size, self._frame.payload.max_size
+        low = self._file.frame.marked.payload[0] if self._file.frame.marked is not None else 0
+        return low, self._frame.payload_max if self._frame is not None else None
+
+    def _check_size(self, message: Message, path: Path) -> None:
+        low, high = self._limits()
+        assert high is not None
         if message.max_size > high:
             excess = message.max_size - high
             hint = f"the frame allows {high}; shorten a field by {excess}, or raise this limit"
@@ -368,6 +372,10 @@ class MessageBuilder:
             )
             self._error("bad-frame", path, what, hint)
         for field in message.variable:
+            if field.walked:
+                what = f"the size of {field.name} varies by any number of bytes, not by steps of {step}"
+                self._error("bad-frame", (*path, field.name), what, "use records of a constant size")
+                continue
             kind, change = field.type, field.max_size
             if not isinstance(kind, Scalar | Bits | Record) and not kind.length.fixed:
                 change = kind.size_of(1)

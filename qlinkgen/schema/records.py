@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from qlinkgen.model.condition import Condition
 from qlinkgen.model.fields import Field, Layout, Record, Records
+from qlinkgen.model.types import Array, Blob, Length, Scalar
 from qlinkgen.schema.compounds import build_length
+from qlinkgen.schema.conditions import EndBuilder
 from qlinkgen.schema.file_base import Fact, Lifetime
 from qlinkgen.schema.file_fields import Fields, FieldSpec, RecordSpec
 from qlinkgen.schema.file_model import SchemaFile
@@ -17,7 +20,7 @@ from qlinkgen.schema.source import Path
 #: Maximum number of records inside each other.
 _MAX_DEPTH = 2
 #: Keys of a field that apply to a record.
-_KEYS = frozenset({"type", "echo", "if", "optional", *Fact.model_fields, *Lifetime.model_fields})
+_KEYS = frozenset({"type", "echo", "if", "optional", "last", *Fact.model_fields, *Lifetime.model_fields})
 
 
 class RecordBuilder:
@@ -53,6 +56,8 @@ class RecordBuilder:
     ) -> Record | Records | None:
         """The type of a field that holds one record or several."""
         location.reject(spec, sorted(Location.written_in(spec) - {*_KEYS}), "a record")
+        if text.count is None:
+            location.reject(spec, ("last",), "a single record")
         if text.base in self._open:
             what = f"record '{text.base}' contains itself"
             location.fault("recursive-type", "type", what, "use another type")
@@ -65,11 +70,33 @@ class RecordBuilder:
             return None
         if text.count is None:
             return Record(layout)
-        length = build_length(text, layout.size, payload_max, location)
+        length = build_length(text, 8 * layout.least, payload_max, location)
         if length is None:
             self._report.taint(location.path)
             return None
-        return Records(layout, length, required=length.minimum > 0)
+        self._check_bound(text, layout, spec, location)
+        last = self._last(spec, layout, length, location) if spec.last else ()
+        return Records(layout, length, required=length.minimum > 0 and not last, last=last)
+
+    def _check_bound(self, text: TypeText, layout: Layout, spec: FieldSpec, location: Location) -> None:
+        if not (text.count or "").strip() and (not layout.fixed or spec.last):
+            what = f"the number of records {layout.name} has no bound, and their size varies"
+            location.fault("bad-record", "type", what, f"write a bound, like {layout.name}[0..8]")
+
+    def _last(self, spec: FieldSpec, layout: Layout, length: Length, location: Location) -> Condition:
+        """The condition that the last record meets, and none before it."""
+        if length.minimum != 1 or length.maximum == 1:
+            what = "an array that ends with its last record has at least one, and a bound"
+            location.fault("bad-record", "type", what, f"write {layout.name}[1..{max(2, length.maximum)}]")
+        tests = EndBuilder(layout, location).tests(spec.last or ())
+        if not tests:
+            self._report.taint(location.path)
+        values = {value.name: value.type for value in layout.values}
+        kinds = [(test, values[test.value]) for test in tests]
+        if not all(test.holds(kind.default) for test, kind in kinds if isinstance(kind, Scalar)):
+            what = f"a new record {layout.name} is not a last one, so a new message has none"
+            location.key_fault("bad-record", "last", what, "give the tested field a default that is one")
+        return tests
 
     def _layout(self, name: str) -> Layout | None:
         if name not in self._built:
@@ -88,23 +115,49 @@ class RecordBuilder:
         self._check(layout, path)
         if len(self._report.faults) > before:
             self._report.taint(path)
-        return layout if layout.size else None
+        return layout if layout.least else None
 
     def _check(self, layout: Layout, path: Path) -> None:
         if not layout.values:
             what = f"record {layout.name} has no value: its fields are constants or reserved"
             hint = "add a field with a value, or put these fields into the messages"
             self._report.error("bad-record", path, what, hint, of_key=True, needs=((*path, "fields"),))
+        elif layout.fields and not layout.least:
+            what = f"a record {layout.name} may be empty, so bytes do not tell the number of them"
+            hint = "add a field that is always present"
+            self._report.error("bad-record", path, what, hint, of_key=True, needs=((*path, "fields"),))
         for field in layout.fields:
             place = (*path, "fields", field.name)
-            if not field.fixed:
-                what = f"{field.name} of the record {layout.name} has no fixed size"
-                hint = "records have a fixed size; give it a number of items, like [4]"
+            if _takes_rest(field):
+                what = (
+                    f"{field.name} takes the rest of the payload, which a record {layout.name} does not know"
+                )
+                hint = "put a count before it, or give it a number of items, like [4]"
                 self._report.error("bad-record", place, what, hint, of_key=True)
+            if isinstance(field.type, Array) and field.type.packed and not field.type.length.fixed:
+                what = f"{field.name} is packed and of variable size, in a record"
+                self._report.error("bad-record", place, what, "give it a fixed number of items", of_key=True)
+            if field.slot or field.terminated:
+                what = f"{field.slot or field.name} varies in a way that a record {layout.name} cannot have"
+                hint = "write fields with if, or a text with a count"
+                self._report.error("bad-record", place, what, hint, of_key=True)
+            if field.optional:
+                what = (
+                    f"{field.name} is optional, but bytes after a record {layout.name} may belong to others"
+                )
+                hint = "say in an earlier field whether it is present, and write if"
+                self._report.error("bad-record", (*place, "optional"), what, hint, of_key=True)
             if _depth((field,)) >= _MAX_DEPTH:
                 what = f"{field.name} would be a record inside of {_MAX_DEPTH} others"
                 hint = "use fields in place of one of the records"
                 self._report.error("extent-depth", place, what, hint, of_key=True)
+
+
+def _takes_rest(field: Field) -> bool:
+    kind = field.type
+    if not isinstance(kind, Blob | Array | Records) or kind.length.fixed or kind.length.counted_by:
+        return False
+    return not isinstance(kind, Records) or not kind.last
 
 
 def _depth(fields: tuple[Field, ...]) -> int:

@@ -177,9 +177,10 @@ _ALL = (
     ),
     Rule(
         "bad-record",
-        "A record has a fixed size and at least one value.",
-        "Arrays of it are divided by that size. Give its fields a number of items, like [4]; a text of "
-        "variable size belongs to the message.",
+        "A record has a value, at least one byte, and an end that its own bytes tell.",
+        "Records of variable size are read one after the other. None of their fields takes the rest of the "
+        "payload: give it a count. An array of them has a bound, as structs of C have room for all of them. "
+        "Where last ends an array, a new record is a last one, and the bounds are [1..N].",
     ),
     Rule(
         "extent-depth",

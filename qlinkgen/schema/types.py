@@ -102,6 +102,7 @@ class TypeBuilder:
         ``seen`` are the named types being built, to detect recursion.
         """
         location = Location(self._report, path, Location.written_in(spec))
+        location.reject(spec, ("last",), "a field that is not an array of records")
         resolved = self._resolve(spec, location, seen)
         kind = self._build(*resolved, location) if resolved else None
         if kind is None:

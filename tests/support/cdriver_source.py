@@ -6,7 +6,7 @@ from pathlib import Path
 
 from qlinkgen.backends.c.interface import count_member, interface
 from qlinkgen.model import naming
-from qlinkgen.model.fields import Record, Records
+from qlinkgen.model.fields import Layout, Record, Records
 from qlinkgen.model.message import Direction, Message, Value
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Scalar
@@ -345,7 +345,7 @@ class _Source:
             self._add("    (void)size;", '    printf("usage");', "}")
 
 
-def _presence(message: Message, value: Value) -> str:
+def _presence(message: Message | Layout, value: Value) -> str:
     """The member that tells whether the field of a value is present, before its first value."""
     first = next(each for each in message.values if each.field is value.field)
     return f"has_{value.field.name}" if _is_optional(value) and first == value else ""
@@ -384,15 +384,35 @@ def _count(value: Value) -> str:
     return f"{naming.member(value.name)}.{naming.member(value.field.case)}.{value.field.quantity}"
 
 
+def _parsed_in(layout: Layout, owner: str, depth: int) -> list[str]:
+    """Statements that set the members of a record."""
+    lines: list[str] = []
+    for value in layout.values:
+        if told := _presence(layout, value):
+            lines.append(f"{owner}{told} = strtoul(word(), NULL, 0) != 0ul;")
+        lines += _parsed(value, owner, depth)
+    return lines
+
+
+def _printed_in(layout: Layout, owner: str, depth: int) -> list[str]:
+    """Statements that print the members of a record."""
+    lines: list[str] = []
+    for value in layout.values:
+        if told := _presence(layout, value):
+            lines.append(f'printf(" %d", {owner}{told} ? 1 : 0);')
+        lines += _printed(value, owner, depth)
+    return lines
+
+
 def _parsed(value: Value, owner: str, depth: int = 0) -> list[str]:
     """Statements that set a member of a struct from words; `owner` ends in a dot."""
     kind, name = value.type, _member(value)
     if isinstance(kind, Record):
-        return [line for each in kind.layout.values for line in _parsed(each, f"{owner}{name}.", depth)]
+        return _parsed_in(kind.layout, f"{owner}{name}.", depth)
     if isinstance(kind, Records):
         index, most = f"at{depth}", kind.length.maximum
         place = f"{owner}{name}[{index} < {most}u ? {index} : 0u]."
-        inner = [line for each in kind.layout.values for line in _parsed(each, place, depth + 1)]
+        inner = _parsed_in(kind.layout, place, depth + 1)
         count_type = "uint8_t" if most < 256 else "uint16_t"
         counted = [] if kind.length.fixed else [f"{owner}{_count(value)} = ({count_type})count{depth};"]
         return [
@@ -442,12 +462,12 @@ def _parsed(value: Value, owner: str, depth: int = 0) -> list[str]:
 def _printed(value: Value, owner: str, depth: int = 0) -> list[str]:
     kind, name = value.type, _member(value)
     if isinstance(kind, Record):
-        return [line for each in kind.layout.values for line in _printed(each, f"{owner}{name}.", depth)]
+        return _printed_in(kind.layout, f"{owner}{name}.", depth)
     if isinstance(kind, Records):
         index, fixed = f"at{depth}", f"{kind.length.maximum}u"
         count = fixed if kind.length.fixed else f"{owner}{_count(value)}"
         place = f"{owner}{name}[{index}]."
-        inner = [line for each in kind.layout.values for line in _printed(each, place, depth + 1)]
+        inner = _printed_in(kind.layout, place, depth + 1)
         return [
             f'printf(" %u", (unsigned){count});',
             f"for (size_t {index} = 0u; {index} < {count}; ++{index}) {{", *inner, "}",

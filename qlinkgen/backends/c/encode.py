@@ -114,7 +114,8 @@ class Encoder:
 
     def _checked(self, record: RecordPlan, value: str) -> list[str]:
         """The statement that checks a record; empty if all its values are legal."""
-        if not Encoder(record.payload, self.layouts).checks():
+        encoder = type(self) if record.payload.walked else Encoder
+        if not encoder(record.payload, self.layouts).checks():
             return []
         function = f"{self.layouts.records[record.name]}_check_"
         upper = self.layouts.prefix.upper()

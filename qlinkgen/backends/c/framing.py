@@ -174,7 +174,9 @@ def is_trimmed(payload: PayloadPlan) -> bool:
 
 def is_wide(message: MessagePlan) -> bool:
     """Whether a wrong count can result in a size that exceeds an int."""
-    return any(run.length.maximum > 0xFF for run in message.payload.runs)
+    payload = message.payload
+    varied = any(segment.records for segment in payload.segments)
+    return varied or any(run.length.maximum > 0xFF for run in payload.runs)
 
 
 def expected(names: Names, address: Address, message: MessagePlan) -> Expected:

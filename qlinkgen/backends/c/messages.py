@@ -86,13 +86,20 @@ class Beside:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordView:
-    """A record, `r` in templates; an empty function checks nothing."""
+    """A record, `r` in templates; an empty function checks nothing.
+
+    Attributes:
+        size: its size; the maximum if it is ``varied``.
+        measure: body of the function that returns the size of a struct, if that is varied.
+    """
 
     function: str
     constant: str
     head: list[str]
     rows: list[str]
     size: int
+    varied: bool
+    measure: list[str]
     size_text: str
     members: list[StructMember]
     initialiser: str
@@ -195,7 +202,11 @@ class MessageWriter:
             return []
         if same:
             return [f"return {same}_size_(message);"]
-        return separated.size_lines(payload, self._layouts) if payload.separator else size_lines(payload)
+        return (
+            separated.size_lines(payload, self._layouts)
+            if payload.separator
+            else size_lines(payload, self._layouts.records)
+        )
 
     def _encode(self, plan: MessagePlan, same: str) -> list[str]:
         own = "message, " if plan.payload.settable else ""
@@ -259,20 +270,29 @@ class MessageWriter:
         function = self._layouts.records[layout.name]
         used = [each for each in plans if layout.name in {r.name for r in each.payload.records}]
         encoded, decoded = any(each.encoded for each in used), any(each.decoded for each in used)
+        encoder = WalkedEncoder if payload.walked else Encoder
         return RecordView(
             function=function,
             constant=function.upper(),
             head=record_head(layout),
             rows=field_rows(payload),
             size=payload.most,
+            varied=payload.walked,
+            measure=size_lines(payload, self._layouts.records) if payload.walked and encoded else [],
             size_text=_size_text(payload.least, payload.most),
             members=self._struct(payload, notes),
             initialiser=self._initialisers(payload),
-            check=Encoder(payload, self._layouts).checks() if encoded else [],
-            put=Encoder(payload, self._layouts).writes() if encoded else [],
-            get=Decoder(payload, self._layouts).record() if decoded else [],
+            check=encoder(payload, self._layouts).checks() if encoded else [],
+            put=encoder(payload, self._layouts).writes() if encoded else [],
+            get=self._get(payload, function) if decoded else [],
             scales=self._scales(function, payload),
         )
+
+    def _get(self, payload: PayloadPlan, function: str) -> list[str]:
+        """Statements that decode a record."""
+        if payload.walked:
+            return WalkedDecoder(payload, self._layouts, init=f"{function.upper()}_INIT").record()
+        return Decoder(payload, self._layouts).record()
 
     def _scales(self, owner: str, payload: PayloadPlan) -> list[Kind]:
         """The conversions of values whose named type does not have them."""

@@ -117,6 +117,13 @@ class Learner:
             self.refuse(broken([bounds], local(count.run), held, 16), "LENGTH")
         self.known.append(count.run)
 
+    def take_sized(self, count: CountStep, number: str, held: Within) -> None:
+        """Assign the bytes of records that are read one by one, and check them."""
+        self.refuse(broken([count.bounds], number, held, count.integer.bits), "LENGTH")
+        number = f"{number} - {count.term.more}U" if count.term.more else number
+        kind = "(size_t)" if count.integer.bits > 16 else ""
+        self.lines.append(f"{count.run}_bytes = {kind}{grouped(number) if kind else number};")
+
     @property
     def least(self) -> str:
         """Minimum size of the payload with the known counts."""

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import re
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
-from qlinkgen.backends.c import checks
+from qlinkgen.backends.c import checks, varied
 from qlinkgen.backends.c.conditions import condition, numbers_of
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.encode import Encoder
 from qlinkgen.backends.c.members import count_of
-from qlinkgen.backends.c.names import count_type, grouped, unsigned
+from qlinkgen.backends.c.names import count_type, grouped, unsigned, unsigned_type
 from qlinkgen.backends.c.sizes import local, local_size, size_text, term_text
 from qlinkgen.model import naming
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.expr import Size, Within
-from qlinkgen.plan.payload import CountStep, PayloadPlan, Presence, RunStep, Segment, Step, holders
+from qlinkgen.plan.payload import (
+    CountStep,
+    PayloadPlan,
+    Presence,
+    RecordsStep,
+    RecordStep,
+    RunStep,
+    Segment,
+    Step,
+    holders,
+)
 
 
 def has_member(segment: Segment) -> str:
@@ -28,16 +39,23 @@ def _in_struct(name: str) -> str:
     return f"message->{naming.member(name)}"
 
 
-def size_lines(payload: PayloadPlan) -> list[str]:
-    """Body of the function that returns the size of the payload of a struct."""
+def size_lines(payload: PayloadPlan, records: Mapping[str, str]) -> list[str]:
+    """Body of the function that returns the size of the payload of a struct.
+
+    ``records`` are the prefixes of the functions of records.
+    """
     numbers = numbers_of(payload)
     always = sum(each.size or 0 for each in payload.segments if each.presence is None)
     lines = [f"size_t size = {always}U;"]
     for segment in payload.segments:
         if segment.presence is None and segment.size is not None:
             continue
-        more = f"{segment.size}U" if segment.size is not None else _struct_size(segment)
-        lines += _guarded(_sent(segment.presence, numbers), [f"size += {more};"])
+        own = [f"size += {segment.size}U;"]
+        if segment.records is not None:
+            own = varied.size_lines(segment.records, records[segment.records.record.name], "size")
+        elif segment.size is None:
+            own = [f"size += {_struct_size(segment)};"]
+        lines += _guarded(_sent(segment.presence, numbers), own)
     return [*lines, "return size;"]
 
 
@@ -86,16 +104,88 @@ class WalkedEncoder(Encoder):
             )
         lines += [f"const size_t size = {self.function}_size_(message);", ""]
         lines += self._checks()
+        if any(segment.records for segment in self.payload.segments):
+            self._refuse([f"size > {self.payload.most}U"], "LENGTH")
         self._refuse(["capacity < size"], "CAPACITY")
         lines += self._flushed()
+        return [*lines, *self._segments()]
+
+    def checks(self) -> list[str]:
+        """Statements that check the values of a record."""
+        return self._with_counts(self._checks())
+
+    def writes(self) -> list[str]:
+        """Statements that write the bytes of a record."""
+        return self._with_counts(self._segments())
+
+    def _with_counts(self, lines: list[str]) -> list[str]:
+        """The statements, after the declarations of the numbers of items that they use."""
+        found: list[str] = []
+        for run in self.payload.runs:
+            if any(re.search(rf"\b{local(run.name)}\b", line) for line in lines):
+                kind = count_type(run.length.maximum)
+                found.append(f"const {kind} {local(run.name)} = message->{run.name}_{run.quantity};")
+        return [*found, *([""] if found else []), *lines]
+
+    def _segments(self) -> list[str]:
+        """Statements that write each segment."""
+        lines: list[str] = []
         last = self.payload.segments[-1]
         for segment in self.payload.segments:
             for step in segment.steps:
                 self._write(step)
-            if segment is not last:
+            if segment is not last and segment.records is None:
                 self.lines.append(f"payload += {_length(segment, local_size)};")
             lines += self._if_sent(segment)
         return lines
+
+    def _write(self, step: Step) -> None:
+        if isinstance(step, CountStep) and step.sized:
+            self.lines += self._sized(step, [])
+        elif isinstance(step, RecordStep | RecordsStep) and step.walked:
+            function = self.layouts.records[step.record.name]
+            value = f"message->{naming.member(step.name)}"
+            if isinstance(step, RecordsStep):
+                self.lines += self._loop(step, self._put_walked(step, function, f"{value}[index]"))
+            else:
+                self.lines += self._put_walked(step, function, value)
+        else:
+            super()._write(step)
+
+    @staticmethod
+    def _put_walked(step: RecordStep | RecordsStep, function: str, value: str) -> list[str]:
+        size = varied.record_size(step, function, value)
+        return [f"{function}_put_(&{value}, payload);", f"payload += {size};"]
+
+    def _sized(self, step: CountStep, refused: list[str]) -> list[str]:
+        """Statements that add up the bytes of records, and refuse or write the count."""
+        run, total = self.payload.run(step.run), f"{step.run}_bytes"
+        assert isinstance(run, RecordsStep)
+        function = self.layouts.records[run.record.name]
+        number = f"({total} + {step.term.more}U)" if step.term.more else total
+        lines = refused
+        if not refused:
+            outer, self.lines = self.lines, []
+            self._put(step.place, step.integer, f"({unsigned_type(step.integer.bits)}){number}")
+            lines, self.lines = self.lines, outer
+        inner = [f"size_t {total} = 0U;", "", *varied.size_lines(run, function, total), *lines]
+        return ["{", *(f"    {line}" if line else "" for line in inner), "}"]
+
+    def _check(self, step: Step) -> None:
+        if isinstance(step, CountStep) and step.sized:
+            most = step.integer.maximum - step.term.more
+            upper = self.layouts.prefix.upper()
+            refused = checks.refusal([f"{step.run}_bytes > {most}U"], f"{upper}_ERROR_LENGTH")
+            if most < min(0xFFFF, self.payload.most):
+                self.lines += self._sized(step, refused)
+            return
+        super()._check(step)
+        if isinstance(step, RecordsStep) and step.last:
+            value = f"message->{naming.member(step.name)}[index]"
+            ends = f"({varied.is_last(step, value)})"
+            differs = f"{ends} != ((index + 1U) == {local(step.name)})"
+            refusal = checks.refusal([differs], f"{self.layouts.prefix.upper()}_ERROR_RANGE")
+            self.lines += self._loop(step, refusal)
 
     def _if_sent(self, segment: Segment) -> list[str]:
         """The statements collected so far, for a segment that is sent."""
@@ -106,6 +196,8 @@ class WalkedEncoder(Encoder):
         lines: list[str] = []
         for segment in self.payload.segments:
             run = segment.run
+            if isinstance(segment.records, RecordsStep) and not segment.records.fixed:
+                run = segment.records
             if run is not None:
                 if run.presence is not None and run.presence.slot:
                     self.lines.append(f"{local(run.name)} = message->{count_of(run)};")
@@ -152,12 +244,36 @@ class WalkedDecoder(Decoder):
         self.reads = True
         kind = self.init.removesuffix("_INIT").lower()
         lines = [f"const {kind}_t defaults = {self.init};"]
-        lines += [f"size_t {local(run.name)} = 0U;" for run in self.payload.runs]
+        lines += self._locals()
         lines.append("*message = defaults;")
         for segment in self.payload.segments:
             lines += self._segment(segment, numbers)
         self.refuse(["size != 0U"], "LENGTH")
         return [*lines, *self._flushed()]
+
+    def record(self) -> list[str]:
+        """Statements that decode a record of variable size, and tell the bytes that it used."""
+        numbers = numbers_of(self.payload)
+        kind = self.init.removesuffix("_INIT").lower()
+        lines = [f"const {kind}_t defaults = {self.init};", "const size_t total = size;"]
+        lines += [*self._locals(), "", "*message = defaults;"]
+        for segment in self.payload.segments:
+            lines += self._segment(segment, numbers)
+        return [*lines, "*used = total - size;"]
+
+    def _locals(self) -> list[str]:
+        """Declarations of numbers of items, and of bytes of records."""
+        lines: list[str] = []
+        for segment in self.payload.segments:
+            run, records = segment.run, segment.records
+            if run is not None:
+                lines.append(f"size_t {local(run.name)} = 0U;")
+            elif isinstance(records, RecordsStep):
+                if varied.is_counted(self.payload, records.name):
+                    lines.append(f"size_t {local(records.name)} = 0U;")
+                if varied.is_sized(self.payload, records.name):
+                    lines.append(f"size_t {records.name}_bytes = 0U;")
+        return lines
 
     def _flushed(self) -> list[str]:
         lines, self.lines = self.lines, []
@@ -165,15 +281,18 @@ class WalkedDecoder(Decoder):
 
     def _segment(self, segment: Segment, numbers: dict[str, Scalar]) -> list[str]:
         run = segment.run
-        if run is not None and segment.terminator:
-            self._find_end(run, segment.terminator[0])
-        elif run is not None and segment.rest is not None:
-            self._infer_rest(run, segment.rest)
+        if segment.records is not None:
+            self.lines += self._walked_records(segment, segment.records)
         else:
-            self.refuse([f"size < {_length(segment, local)}"], "LENGTH")
-        for step in segment.steps:
-            self._read(step)
-        self.lines += [f"payload += {_length(segment, local)};", f"size -= {_length(segment, local)};"]
+            if run is not None and segment.terminator:
+                self._find_end(run, segment.terminator[0])
+            elif run is not None and segment.rest is not None:
+                self._infer_rest(run, segment.rest)
+            else:
+                self.refuse([f"size < {_length(segment, local)}"], "LENGTH")
+            for step in segment.steps:
+                self._read(step)
+            self.lines += [f"payload += {_length(segment, local)};", f"size -= {_length(segment, local)};"]
         inner, presence = self._flushed(), segment.presence
         if presence is None:
             return inner
@@ -195,6 +314,27 @@ class WalkedDecoder(Decoder):
         low = [f"{name} < {length.minimum}U"] if length.minimum else []
         self.refuse([f"{name} == size", *low, f"{name} > {length.maximum}U"], "LENGTH")
 
+    def _walked_records(self, segment: Segment, step: RecordStep | RecordsStep) -> list[str]:
+        upper = self.layouts.prefix.upper()
+        reader = varied.Reader(self.layouts.records[step.record.name], upper)
+        if isinstance(step, RecordStep):
+            return reader.one(step)
+        if step.last:
+            return reader.ended(step)
+        exact, lines = "", list[str]()
+        if segment.rest is not None:
+            rest = grouped(size_text(segment.rest, local))
+            exact = f"size - {rest}" if rest != "0U" else "size"
+            lines = checks.refusal([f"size < {rest}"] if rest != "0U" else [], f"{upper}_ERROR_LENGTH")
+        elif varied.is_sized(self.payload, step.name):
+            exact = f"{step.name}_bytes"
+            lines = checks.refusal([f"size < {exact}"], f"{upper}_ERROR_LENGTH")
+        if step.fixed:
+            return [*lines, *reader.counted(step, f"{step.length.maximum}U")]
+        if varied.is_counted(self.payload, step.name):
+            return [*lines, *reader.counted(step, local(step.name), exact=exact)]
+        return [*lines, *reader.filled(step, exact)]
+
     def _infer_rest(self, run: RunStep, after: Size) -> None:
         length, name = run.length, local(run.name)
         rest = grouped(size_text(after, local))
@@ -214,7 +354,9 @@ class WalkedDecoder(Decoder):
             return
         self._get(step.place, step.integer)
         number = self.number(step)
-        if step.run in self.counted:
+        if step.sized:
+            self._sized(step, number)
+        elif step.run in self.counted:
             items = term_text(step.term, local(step.run))
             own = Within(0, step.integer.maximum)
             negative = checks.broken([own], number, Within(0, step.integer.mask), step.integer.bits)
@@ -222,3 +364,13 @@ class WalkedDecoder(Decoder):
         else:
             self.counted.add(step.run)
             self.take(step, number)
+
+    def _sized(self, step: CountStep, number: str) -> None:
+        """Take the bytes of records from a count, or compare them."""
+        size, more, held = f"{step.run}_bytes", step.term.more, Within(0, step.integer.mask)
+        if size in self.counted:
+            told = f"({size} + {more}U)" if more else size
+            self.refuse([f"{number} != {told}"], "LENGTH")
+            return
+        self.counted.add(size)
+        self.take_sized(step, number, held)

@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from qlinkgen.backends.c import checks
-from qlinkgen.backends.c.conditions import condition, numbers_of
+from qlinkgen.backends.c.checks import refusal
+from qlinkgen.backends.c.conditions import condition
 from qlinkgen.backends.c.names import scalar_type, unsigned, unsigned_type
+from qlinkgen.model.condition import Test
 from qlinkgen.model.integer import Integer
-from qlinkgen.plan.payload import BitsStep, CountStep, Segment, Step, ValueStep
+from qlinkgen.plan.expr import Within
+from qlinkgen.plan.payload import (
+    BitsStep,
+    CountStep,
+    Member,
+    PayloadPlan,
+    RecordsStep,
+    RecordStep,
+    Segment,
+    Step,
+    ValueStep,
+    holders,
+    renamed,
+    renamed_tests,
+)
 
 if TYPE_CHECKING:
     from qlinkgen.backends.c.sizes import Learner
@@ -17,61 +34,110 @@ if TYPE_CHECKING:
 
 def walked_size_lines(learner: Learner) -> list[str]:
     """Lines of the case, which end with a return."""
-    return _Sizer(learner).lines()
+    return _Sizer(learner, learner.payload.segments).lines(learner.payload)
 
 
 class _Sizer:
-    def __init__(self, learner: Learner) -> None:
-        self._learner, self._payload = learner, learner.payload
-        self._tested = {
-            t.value for each in self._payload.segments if each.presence for t in each.presence.when
-        }
-        self._counted: set[str] = set()
-        # Received bytes have not been checked: a bool may be any number here.
-        numbers = numbers_of(self._payload)
-        self._numbers = {name: replace(number, meaning=None) for name, number in numbers.items()}
+    """Collects the statements, those of records inside of others in blocks with other locals."""
 
-    def lines(self) -> list[str]:
-        """Lines of the case."""
+    def __init__(
+        self, learner: Learner, segments: Sequence[Segment], last: Sequence[Test] = (), depth: int = 0
+    ) -> None:
+        """``last`` tests values of a record."""
+        self._learner, self._segments, self._depth = learner, segments, depth
+        tests = [test for each in segments if each.presence for test in each.presence.when]
+        self._tested = {test.value for test in (*tests, *last)}
+        self._steps = [step for each in segments for step in each.steps]
+        self._counted: set[tuple[str, bool]] = set()
+        # Received bytes have not been checked: a bool may be any number here.
+        values = (each for each in holders(self._steps) if isinstance(each, ValueStep | Member))
+        self._numbers = {each.name: replace(each.number, meaning=None) for each in values}
+
+    def lines(self, payload: PayloadPlan) -> list[str]:
+        """Lines of the case of a message."""
         upper = self._learner.layouts.prefix.upper()
-        names = [each for each in self._numbers if each in self._tested]
-        lines = ["size_t at = 0U;"]
-        lines += [f"{scalar_type(self._numbers[name])} {name}_raw;" for name in names]
-        lines += [f"size_t {each.run}_count = 0U;" for each in self._counts()]
-        lines.append(f"*size = {self._payload.least}U;")
-        for segment in self._payload.segments:
-            lines += self._segment(segment)
+        lines = ["size_t at = 0U;", *self._locals(), f"*size = {payload.least}U;", *self._walk()]
+        if any(segment.records for segment in self._segments):
+            lines += refusal([f"*size > {payload.most}U"], f"{upper}_ERROR_LENGTH")
         lines += ["(void)at;", f"return (available < *size) ? {upper}_ERROR_TRUNCATED : {upper}_OK;"]
         return ["{", *(f"    {line}" for line in lines), "}"]
 
-    def _counts(self) -> list[CountStep]:
-        counts = (step for step in self._payload.steps if isinstance(step, CountStep))
-        return list({step.run: step for step in counts}.values())
+    def _locals(self) -> list[str]:
+        names = [each for each in self._numbers if each in self._tested]
+        lines = [f"{scalar_type(self._numbers[name])} {name}_raw;" for name in names]
+        counts = (step for step in self._steps if isinstance(step, CountStep))
+        found = dict.fromkeys(f"{step.run}_{'bytes' if step.sized else 'count'}" for step in counts)
+        return [*lines, *(f"size_t {name} = 0U;" for name in found)]
+
+    def _walk(self) -> list[str]:
+        return [line for segment in self._segments for line in self._segment(segment)]
 
     def _segment(self, segment: Segment) -> list[str]:
         learner, run = self._learner, segment.run
         for step in segment.steps:
             self._decided(step)
-        size = f"{segment.size}U"
-        if run is not None:
-            count = f"{run.name}_count"
-            size = f"{run.item_size}U * {count}" if run.item_size > 1 else count
-        least = run.item_size * run.length.minimum if run is not None and segment.presence is None else 0
-        if run is not None or segment.presence is not None:
-            learner.lines.append(f"*size += {size}{f' - {least}U' if least else ''};")
-        learner.lines.append(f"at += {size};")
+        if segment.records is not None:
+            learner.lines += self._records(segment.records, present=segment.presence is None)
+        else:
+            size = f"{segment.size}U"
+            if run is not None:
+                count = f"{run.name}_count"
+                size = f"{run.item_size}U * {count}" if run.item_size > 1 else count
+            least = run.item_size * run.length.minimum if run is not None and segment.presence is None else 0
+            if run is not None or segment.presence is not None:
+                learner.lines.append(f"*size += {size}{f' - {least}U' if least else ''};")
+            learner.lines.append(f"at += {size};")
         inner, learner.lines = learner.lines, []
         if segment.presence is None:
             return inner
-        test = condition(segment.presence.when, self._numbers, lambda name: f"{name}_raw")
-        return [f"if ({test}) {{", *(f"    {line}" for line in inner), "}"]
+        return ["if (" + self._condition(segment.presence.when) + ") {", *_indented(inner), "}"]
+
+    def _condition(self, tests: Sequence[Test]) -> str:
+        return condition(tests, self._numbers, lambda name: f"{name}_raw")
+
+    def _records(self, step: RecordStep | RecordsStep, *, present: bool) -> list[str]:
+        """Statements for walked records; some of them are in the minimum of what is ``present``."""
+        own, suffix = step.record.payload, f"_{self._depth + 1}"
+        if isinstance(step, RecordStep):
+            more = [] if present else [f"*size += {own.least}U;"]
+            return ["{", *_indented(self._inside(step, suffix, more)), "}"]
+        counted = step.length.minimum if present else 0
+        size = f"{step.name}_bytes"
+        if (step.name, True) in self._counted:
+            least = f" - {counted * own.least}U" if counted else ""
+            return [f"*size += {size}{least};", f"at += {size};"]
+        more, index = [f"*size += {own.least}U;"], f"index{suffix}"
+        if counted:
+            more = [f"if ({index} >= {counted}U) {{", *_indented(more), "}"]
+        number = f"{step.length.maximum}U" if step.fixed or step.last else f"{step.name}_count"
+        if not step.last:
+            head = f"for (size_t {index} = 0U; {index} < {number}; ++{index}) {{"
+            return [head, *_indented(self._inside(step, suffix, more)), "}"]
+        ended = f"ended{suffix}"
+        upper = self._learner.layouts.prefix.upper()
+        head = f"for (size_t {index} = 0U; !{ended}; ++{index}) {{"
+        bound = refusal([f"{index} >= {number}"], f"{upper}_ERROR_LENGTH")
+        body = [*bound, *self._inside(step, suffix, more, ended)]
+        return ["{", f"    bool {ended} = false;", "", *_indented([head, *_indented(body), "}"]), "}"]
+
+    def _inside(
+        self, step: RecordStep | RecordsStep, suffix: str, more: list[str], ended: str = ""
+    ) -> list[str]:
+        """Statements for one record; ``ended`` is the local that tells whether it is the last one."""
+        last = renamed_tests(step.last, suffix) if isinstance(step, RecordsStep) else ()
+        inner = _Sizer(self._learner, renamed(step.record.segments, suffix), last, self._depth + 1)
+        outer, self._learner.lines = self._learner.lines, []
+        lines = [*inner._locals(), *more, *inner._walk()]
+        self._learner.lines = outer
+        return [*lines, f"{ended} = {inner._condition(last)};"] if ended else lines
 
     def _decided(self, step: Step) -> None:
         """Statements that read a step which decides later sizes."""
         if not isinstance(step, ValueStep | BitsStep | CountStep):
             return
         names = {each.name for each in step.members} if isinstance(step, BitsStep) else {step.name}
-        if step.run in self._counted if isinstance(step, CountStep) else not names & self._tested:
+        known = isinstance(step, CountStep) and (step.run, step.sized) in self._counted
+        if known or (not isinstance(step, CountStep) and not names & self._tested):
             return
         learner, front = self._learner, step.place.front.fixed
         learner.refuse([f"available < (at + {front + step.integer.size}U)"], "TRUNCATED")
@@ -85,8 +151,11 @@ class _Sizer:
                     kind = unsigned_type(member.bits)
                     self._assign(member.name, f"({kind})(({raw} >> {member.shift}) & {mask})")
         else:
-            self._counted.add(step.run)
-            learner.take(step, raw)
+            self._counted.add((step.run, step.sized))
+            if step.sized:
+                learner.take_sized(step, raw, Within(0, step.integer.mask))
+            else:
+                learner.take(step, raw)
 
     def _peek(self, integer: Integer, front: int) -> str:
         return self._learner.layouts.peek(integer, "payload", f"at + {front}U" if front else "at")
@@ -94,3 +163,7 @@ class _Sizer:
     def _assign(self, name: str, raw: str) -> None:
         value = checks.from_unsigned(self._numbers[name], raw, self._learner.layouts)
         self._learner.lines.append(f"{name}_raw = {value};")
+
+
+def _indented(lines: list[str]) -> list[str]:
+    return [f"    {line}" if line else "" for line in lines]

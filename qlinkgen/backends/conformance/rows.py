@@ -188,17 +188,27 @@ def value_sizes(header: Header, holders: Sequence[Holder], values: bytes) -> lis
             at = sum(sizes) + told
             raw = values[at : at + header.width(step.number)]
             numbers[step.name] = int.from_bytes(raw, "big", signed=step.number.signed)
-        match step:
-            case ValueStep() | Member() | RecordStep():
-                sizes.append(told + _most(header, step))
-            case BytesStep() | ItemsStep() | RecordsStep():
-                at, counted = sum(sizes) + told, _counted(header, step)
-                most = step.length.maximum
-                count = int.from_bytes(values[at : at + counted], "big") if counted else most
-                sizes.append(told + counted + _item(header, step) * count)
-            case _:
-                assert_never(step)
+        sizes.append(told + _value_size(header, step, values[sum(sizes) + told :]))
     return sizes
+
+
+def _value_size(header: Header, step: Holder, values: bytes) -> int:
+    """Size of the value that a vector begins with."""
+    match step:
+        case ValueStep() | Member():
+            return header.width(step.number)
+        case RecordStep():
+            return sum(value_sizes(header, step.record.payload.settable, values))
+        case BytesStep() | ItemsStep() | RecordsStep():
+            size = _counted(header, step)
+            count = int.from_bytes(values[:size], "big") if size else step.length.maximum
+            if not isinstance(step, RecordsStep):
+                return size + _item(header, step) * count
+            for _ in range(count):
+                size += sum(value_sizes(header, step.record.payload.settable, values[size:]))
+            return size
+        case _:
+            assert_never(step)
 
 
 def _most(header: Header, step: Holder) -> int:

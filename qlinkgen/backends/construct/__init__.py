@@ -42,6 +42,7 @@ _SUPPORT = {
     "_kinds": "Kind Kinds",
     "_ftrimmed": "Trimmed",
     "_fwalks": "TerminatedText Walked",
+    "_fvaried": "One Several SizeOf Varied VariedRecord",
 }
 #: Copied only if a tree uses them.
 _OPTIONAL = tuple(name for name in _SUPPORT if name not in ("_fields", "_frames"))
@@ -56,6 +57,8 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
     text = "".join([_head(protocol), _imports(everything), *map(printed, everything)])
     folder = importlib.resources.files(__name__)
     names = {name for each in everything for name in used(each.node)}
+    # Records that are read one by one are walked.
+    names |= {"Walked"} if names & {*_SUPPORT["_fvaried"].split()} else set()
     copied_modules = [each for each in _SUPPORT if each not in _OPTIONAL or names & {*_SUPPORT[each].split()}]
     shared = {name: folder.joinpath(f"{name}.py").read_text("utf-8") for name in copied_modules}
     shared["__init__"] = _PACKAGE_DOC

@@ -51,6 +51,7 @@ def live(protocol: Protocol, options: Options | None = None) -> Live:
         "_frecords",
         "_ftexts",
         "_ftrimmed",
+        "_fvaried",
         "_fwalks",
         "_packed",
         "_ended",

@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import assert_never
 
-from qlinkgen.backends.construct.payload import Names, Types, beside, comment, fields, integer, record
+from qlinkgen.backends.construct.payload import (
+    Names,
+    Types,
+    beside,
+    comment,
+    fields,
+    integer,
+    presence_of,
+    record,
+)
 from qlinkgen.backends.construct.tree import Call, Definition, Node, Ref, Sequence, hexadecimal
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.frame import FrameKinds
@@ -101,6 +110,8 @@ def _message(message: MessagePlan, types: Types) -> Call:
     elif message.payload.walked:
         settings |= _walking(message.payload)
     name = _class_of(message.payload)
+    if any(segment.records for segment in message.payload.segments):
+        settings["most"] = message.payload.most
     return Call(
         name, (message.name, hexadecimal(message.id), *fields(message, types)), tuple(settings.items())
     )
@@ -108,7 +119,7 @@ def _message(message: MessagePlan, types: Types) -> Call:
 
 def _walking(payload: PayloadPlan) -> dict[str, Node]:
     """The settings of a payload in which fields may be absent."""
-    settings: dict[str, Node] = {"presence": Sequence(tuple(_presence(payload)))}
+    settings: dict[str, Node] = {"presence": Sequence(tuple(presence_of(payload)))}
     if payload.most < sum(map(full_size, payload.steps)):
         settings["most"] = payload.most
     if choices := tuple(_choices(payload)):
@@ -119,20 +130,14 @@ def _walking(payload: PayloadPlan) -> dict[str, Node]:
 def _class_of(payload: PayloadPlan) -> str:
     if payload.separator:
         return "Separated"
+    if any(segment.records for segment in payload.segments):
+        return "Varied"
     return "Walked" if payload.walked else "Message" if payload.trim is None else "Trimmed"
 
 
 def _absent(payload: PayloadPlan) -> Iterator[Presence]:
     """What decides about each text that may be absent."""
     return (step.presence for step in payload.steps if step.presence)
-
-
-def _presence(payload: PayloadPlan) -> Iterator[Node]:
-    """The fields that may be absent, and what decides."""
-    for segment in payload.segments:
-        if presence := segment.presence:
-            tests: tuple[Node, ...] = tuple((each.value, each.ranges, each.negated) for each in presence.when)
-            yield presence.field, tests, presence.given
 
 
 def _choices(payload: PayloadPlan) -> Iterator[Node]:

@@ -26,6 +26,7 @@ from qlinkgen.plan.payload import (
     CountStep,
     ItemsStep,
     Member,
+    PayloadPlan,
     RecordsStep,
     RecordStep,
     ReservedStep,
@@ -104,6 +105,13 @@ class Types:
         self._plan = plan
         #: The names of the definitions of records.
         self.records = {each.name: names.of(each.name, "TYPE") for each in plan.layouts}
+        #: Records that end arrays.
+        self.ended = {
+            step.record.name
+            for payload in self._payloads()
+            for step in payload.steps
+            if isinstance(step, RecordsStep) and step.last
+        }
         found: dict[str, Counter[Node]] = {}
         for number, raw in self._numbers():
             if name := _name(number):
@@ -143,9 +151,7 @@ class Types:
 
     def _numbers(self) -> Iterator[tuple[Scalar, Node]]:
         yield from ((member.number, _bits(member)) for member in self._plan.beside.values())
-        payloads = [message.payload for message in self._plan.messages]
-        payloads += [record.payload for record in all_records(payloads)]
-        for step in (step for payload in payloads for step in payload.steps):
+        for step in (step for payload in self._payloads() for step in payload.steps):
             match step:
                 case ValueStep():
                     yield step.number, _raw(step.number, step.integer)
@@ -159,6 +165,11 @@ class Types:
                     pass
                 case _:
                     assert_never(step)
+
+    def _payloads(self) -> list[PayloadPlan]:
+        """Those of messages, and of the records in them."""
+        payloads = [message.payload for message in self._plan.messages]
+        return [*payloads, *(record.payload for record in all_records(payloads))]
 
     def value(self, number: Scalar, raw: Node) -> Node:
         """The adapter with a default."""
@@ -196,8 +207,21 @@ def fields(message: MessagePlan, types: Types) -> tuple[Node, ...]:
 
 def record(layout: Layout, types: Types) -> Call:
     """The structure of a record."""
-    steps = record_plan(layout).payload.steps
-    return Call("Record", (layout.name, *(_Field(layout, types).of(step) for step in steps)))
+    payload = record_plan(layout).payload
+    inside: tuple[Node, ...] = (layout.name, *(_Field(layout, types).of(step) for step in payload.steps))
+    if not payload.walked and layout.name not in types.ended:
+        return Call("Record", inside)
+    presence = tuple(presence_of(payload))
+    settings: dict[str, Node] = {"presence": Sequence(presence)} if presence else {}
+    return Call("VariedRecord", inside, (*settings.items(), ("most", payload.most)))
+
+
+def presence_of(payload: PayloadPlan) -> Iterator[Node]:
+    """The fields that may be absent, and what decides."""
+    for segment in payload.segments:
+        if presence := segment.presence:
+            tests: tuple[Node, ...] = tuple((each.value, each.ranges, each.negated) for each in presence.when)
+            yield presence.field, tests, presence.given
 
 
 def beside(part: CellPart, types: Types) -> Call:
@@ -235,12 +259,8 @@ class _Field:
                 kind, item = ("PackedField", _row(step)) if step.packed else ("ArrayField", ())
                 items = Sequence(tuple(_shown(step.number, each) for each in step.default))
                 return self._run(step, kind, (self._types.of(step.number, _item(step)), *item), items)
-            case RecordStep():
-                node = Call("Default", (Ref(self._types.records[step.record.name]), Call("Container")))
-                return self._named(step, node)
-            case RecordsStep():
-                empty = Sequence((Call("Container"),) * step.length.minimum)
-                return self._run(step, "ArrayField", (Ref(self._types.records[step.record.name]),), empty)
+            case RecordStep() | RecordsStep():
+                return self._record(step)
             case _:
                 assert_never(step)
 
@@ -253,6 +273,22 @@ class _Field:
             return self._named(step, Call("Default", (text, default)))
         kind, pad = (f"Padded{kind}", (step.pad,)) if step.pad else (kind, ())
         return self._run(step, kind, pad, default)
+
+    def _record(self, step: RecordStep | RecordsStep) -> Named:
+        known = Ref(self._types.records[step.record.name])
+        if isinstance(step, RecordStep):
+            node = Call("One", (known,)) if step.walked else known
+            return self._named(step, Call("Default", (node, Call("Container"))))
+        if step.walked:
+            return self._several(step)
+        return self._run(step, "ArrayField", (known,), Sequence((Call("Container"),) * step.length.minimum))
+
+    def _several(self, step: RecordsStep) -> Named:
+        last = tuple((each.value, each.ranges, each.negated) for each in step.last)
+        given = (Ref(self._types.records[step.record.name]), step.length.minimum, step.length.maximum)
+        node = Call("Several", (*given, Sequence(last)) if last else given)
+        empty = Sequence((Call("Container"),) * step.length.minimum)
+        return self._named(step, Call("Default", (node, empty)))
 
     def _run(self, step: RunStep, kind: str, item: tuple[Node, ...], default: Node) -> Named:
         run = Call(kind, (*item, step.length.minimum, step.length.maximum))
@@ -279,6 +315,9 @@ def _reserved(step: ReservedStep) -> Call:
 
 def _count(step: CountStep) -> Call:
     term = step.term
+    if step.sized:
+        more = (("more", term.more),) if term.more else ()
+        return Call("SizeOf", (integer(step.integer), step.run), more)
     scale: tuple[Node, ...] = (term.factor,) if term.packed or term.factor > 1 else ()
     packed = (("packed", True),) if term.packed else ()
     more = (("more", term.more),) if term.more else ()

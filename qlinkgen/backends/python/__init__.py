@@ -26,6 +26,10 @@ A codec needs only the standard library and the modules with an underscore in th
 '''
 
 
+#: Support modules that only some modules use.
+_SHARED = ("_rules", "_rwalks", "_records", "_rvaried")
+
+
 def generate(protocol: Protocol, options: Options) -> Outputs:
     """The module of a protocol and the files of its package, by path."""
     text = render(plan_of(protocol, options))

@@ -96,7 +96,7 @@ def read_record(kind: type[AnyRecord], data: bytes, at: int) -> AnyRecord:
     try:
         return kind.from_checked(bytes(data[at : at + kind.MAX_SIZE]))
     except DecodeError as error:
-        raise _moved(error, "", 0) from None
+        raise moved(error, "", 0) from None
 
 
 def read_records(
@@ -109,11 +109,12 @@ def read_records(
         for at in range(start, start + size * count, size):
             found.append(read(bytes(data[at : at + size])))
     except DecodeError as error:
-        raise _moved(error, f"[{len(found)}]", size * len(found)) from None
+        raise moved(error, f"[{len(found)}]", size * len(found)) from None
     return found
 
 
-def _moved(error: DecodeError, index: str, offset: int) -> DecodeError:
+def moved(error: DecodeError, index: str, offset: int) -> DecodeError:
+    """The error of a record as one of the field that holds it."""
     field = f"{index}.{error.field}"
     return DecodeError(
         f"{index}: {error}", error.kind, field, offset + error.offset, error.data

@@ -17,7 +17,7 @@ from qlinkgen.backends.python.names import attribute, class_name, constant_name,
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.sections import way_class
 from qlinkgen.backends.python.separated import SeparatedDecoder, SeparatedEncoder
-from qlinkgen.backends.python.walked import WalkedDecoder, WalkedEncoder
+from qlinkgen.backends.python.walked import VariedDecoder, WalkedDecoder, WalkedEncoder
 from qlinkgen.model.fields import Layout, Value
 from qlinkgen.model.frame import ATTRIBUTE
 from qlinkgen.model.message import Message
@@ -123,6 +123,8 @@ class ClassBuilder:
         builder = ClassBuilder(self._plan, self._place.bare)
         builder._scales = self._scales
         base, name = self._place.use("BaseRecord"), self._place.classes[layout.name]
+        if not layout.fixed:
+            base = self._place.use("VariedRecord")
         message = _message_of(layout)
         head = ClassModel(name, base, builder._doc(message), [f'NAME = "{layout.name}"'])
         return builder._with_codec(message, head, f"RECORD_{constant_name(layout.name)}", "")
@@ -185,6 +187,8 @@ class ClassBuilder:
         """A class with its code; ``title`` is a part of the names of its constants, ``number`` is its id."""
         scales = self._scales_of(message)
         make_encoder, make_decoder = _makers(message.payload)
+        if message.payload.walked and not number:
+            make_decoder = VariedDecoder
         place = self._within(message)
         encoder = make_encoder(message, place, title, number, scales)
         decoder = make_decoder(message, place, title, scales)

@@ -15,6 +15,7 @@ from qlinkgen.backends.python.layout import (
 from qlinkgen.backends.python.names import attribute, source_of
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
+from qlinkgen.backends.python.varied import ends, is_sized, octets_of
 from qlinkgen.model.integer import Integer, packed_size
 from qlinkgen.model.types import Float
 from qlinkgen.plan.expr import Condition, Within
@@ -253,13 +254,15 @@ class Encoder:
             case ConstantStep() | ReservedStep():
                 self._number(step.integer, step.value)
             case CountStep():
-                self._computed(step.name, step.integer, integers.term_text(step.term))
+                self._computed(step.name, step.integer, integers.count_text(step))
             case BitsStep():
                 self._bits(step)
             case BytesStep():
                 self._bytes(step)
             case ItemsStep():
                 self._items(step)
+            case RecordStep() if step.walked:
+                self._pieces.append(octets_of(step, self.place))
             case RecordStep():
                 name = self.place.classes[step.record.name]
                 self._add(f"{step.record.size}s", f"{name}.to_bytes({source_of(step)})")
@@ -436,10 +439,16 @@ class Encoder:
         self._pieces.append(f'b"".join({octets})')
 
     def _records(self, step: RecordsStep) -> None:
-        name, source = self.place.classes[step.record.name], source_of(step)
-        octets = f'b"".join([{name}.to_bytes(each) for each in {source}])'
+        source = source_of(step)
+        octets = octets_of(step, self.place)
+        if step.last:
+            flags = f"[{ends(step)} for each in {source}]"
+            self._terms.append(f"{flags} == [False] * ({step.name}_count - 1) + [True]")
         if step.fixed:
             self._terms.append(f"len({source}) == {step.length.maximum}")
+        if is_sized(self.message.payload, step.name):
+            self._pieces.append(f"{step.name}_octets")
+        elif step.fixed and not step.walked:
             self._add(f"{step.length.maximum * step.item_size}s", octets)
         else:
             self._pieces.append(octets)

@@ -10,6 +10,7 @@ from qlinkgen.backends.python.layout import slice_of
 from qlinkgen.model.digits import Digits
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
+from qlinkgen.plan.payload import CountStep
 
 #: Format letters of struct for integers by size; lower case is signed.
 _LETTERS = {1: "B", 2: "H", 4: "I", 8: "Q"}
@@ -217,6 +218,13 @@ def term_text(term: Term) -> str:
     product = f"{term.factor} * {count}" if term.factor > 1 else count
     product = f"({product} + 7) // 8" if term.packed else product
     return f"{product} + {term.more}" if term.more else product
+
+
+def count_text(step: CountStep) -> str:
+    """What a count tells over the local variables of its run."""
+    if not step.sized:
+        return term_text(step.term)
+    return f"{step.run}_bytes + {step.term.more}" if step.term.more else f"{step.run}_bytes"
 
 
 def own_bytes(term: Term, number: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from qlinkgen.backends.python import integers
-from qlinkgen.backends.python.walked import walked_measure_lines
+from qlinkgen.backends.python.walked_size import walked_measure_lines
 from qlinkgen.plan.expr import Within
 from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan, term_of
 

@@ -30,6 +30,7 @@ _PUBLIC = ("Bus", "CodecError", "Command", "Counters", "DecodeError", "EncodeErr
 #: Names of struct and of other modules; all others are imported from the support module.
 _STRUCT = ("Struct", "pack", "unpack", "unpack_from")
 _RECORD = "BaseRecord"
+_VARIED_RECORD = "VariedRecord"
 #: Modules that are written only where used, in the order of their names.
 _SHARED: Mapping[str, Sequence[str]] = {
     "_checks": (
@@ -47,6 +48,7 @@ _SHARED: Mapping[str, Sequence[str]] = {
     "_rchoices": ("ChoiceRule",),
     "_records": (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records"),
     "_rules": ("FloatRule", "ListRule", "PaddedRule"),
+    "_rvaried": ("EndedRule", _VARIED_RECORD, "read_counted", "read_ended", "read_filled", "read_one"),
     "_rwalks": ("MaybeRule", "Misplaced", "NEW", "misplaced"),
 }
 _ELSEWHERE = {"Decimal", "index", *_STRUCT, *(name for names in _SHARED.values() for name in names)}
@@ -171,14 +173,16 @@ class Module:
         framed = self.place.envelope is not None
         texts = []
         for each in models:
-            whole = framed and each.base != _RECORD
-            kind = "record" if each.base == _RECORD else "whole frame as sent" if whole else "payload"
+            record = each.base in (_RECORD, _VARIED_RECORD)
+            whole = framed and not record
+            kind = "record" if record else "whole frame as sent" if whole else "payload"
             text = template.render(
                 each=each,
                 wrap=self._wrap(each, view) if each.has_codec and whole else [],
                 encoder="to_frame" if whole else "to_bytes",
                 encoder_doc=f"The {'bytes of the ' * (kind == 'record')}{kind}. Raises EncodeError.",
                 data=self.place.data if whole else "payload",
+                varied=each.base == _VARIED_RECORD,
             )
             texts.append(ways.of(text, each.way))
         return "".join(texts).strip("\n")

@@ -11,6 +11,7 @@ from qlinkgen.backends import python_text
 from qlinkgen.backends.python.layout import Call, literal
 from qlinkgen.backends.python.names import attribute, held
 from qlinkgen.backends.python.place import Place
+from qlinkgen.backends.python.varied import is_last
 from qlinkgen.model.condition import Test
 from qlinkgen.model.message import Value
 from qlinkgen.model.types import Enum, Flags, Float, Scalar
@@ -260,6 +261,8 @@ def _record_rule(step: RecordStep | RecordsStep, place: Place) -> Call:
     name, kind = held(step), place.classes[step.record.name]
     if isinstance(step, RecordStep):
         return _rule(place, "RecordRule", name, kind)
+    if step.last:
+        return _rule(place, "EndedRule", name, kind, step.length.maximum, is_last(step))
     return _rule(place, "RecordsRule", name, kind, step.length.minimum, step.length.maximum)
 
 

@@ -2,45 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from qlinkgen.backends.python import integers
 from qlinkgen.backends.python.decode import Decoder, assigned_targets, divided
 from qlinkgen.backends.python.encode import Encoder, Row
-from qlinkgen.backends.python.layout import bare, indented, literal
+from qlinkgen.backends.python.layout import indented, literal
 from qlinkgen.backends.python.names import attribute, held, source_of
 from qlinkgen.backends.python.structs import format_of
 from qlinkgen.backends.python.values import condition_text
+from qlinkgen.backends.python.varied import condition, is_sized, octets_of, read_lines
+from qlinkgen.backends.python.walked_size import sized_lines, times
 from qlinkgen.model.condition import Test
-from qlinkgen.model.integer import Integer
-from qlinkgen.plan.expr import OneOf, Size, Within
+from qlinkgen.plan.expr import Size, Within
 from qlinkgen.plan.parts import LengthPart
 from qlinkgen.plan.payload import (
-    BitsStep,
     BytesStep,
     CountStep,
-    PayloadPlan,
     Presence,
+    RecordsStep,
     RecordStep,
     RunStep,
     Segment,
     Step,
-    ValueStep,
     complete,
     holders,
 )
-
-
-def condition(tests: Sequence[Test], number: str) -> str:
-    """The expression of a condition; ``number`` is the format of the name of a value."""
-    terms = [_test(each, number.format(each.value)) for each in tests]
-    return " and ".join(terms) if len(terms) > 1 else bare(terms[0])
-
-
-def _test(test: Test, number: str) -> str:
-    rule = OneOf(tuple(Within(*each) for each in test.ranges))
-    return integers.broken(rule, number) if test.negated else integers.holds(rule, number)
 
 
 @dataclass
@@ -64,6 +52,9 @@ class WalkedEncoder(Encoder):
             if segment.presence is not None and segment.presence.optional:
                 # The bits of an integer have values of their own, which are given or absent together.
                 before = next((each.name for each in holders(segment.steps)), before)
+        if any(segment.records for segment in self.message.payload.segments):
+            wrong = f"    raise {self.place.use('OutOfRange')}"
+            lines += [f"if len(data) > {self.message.payload.most}:", wrong]
         return [*lines, *self._framed(name)]
 
     def _flushed(self) -> list[str]:
@@ -84,11 +75,17 @@ class WalkedEncoder(Encoder):
         self._terms.append(integers.holds(bounds, f"{run.name}_count"))
         if isinstance(run, BytesStep) and run.terminator:
             self._terms.append(f"{literal(run.terminator)} not in {source}")
+        absent = [f"{run.name}_count = 0"]
+        if is_sized(self.message.payload, run.name):
+            assert isinstance(run, RecordsStep)
+            octets = f"{run.name}_octets"
+            self._late += [f"{octets} = {octets_of(run, self.place)}", f"{run.name}_bytes = len({octets})"]
+            absent.append(f"{run.name}_bytes = 0")
         lines = self._flushed()
         if run.presence is None or run.presence.slot:
             return lines
         given = f"if self.{held(run)} is not None:"
-        return [f"{run.name}_count = 0", given, *indented(lines)]
+        return [*absent, given, *indented(lines)]
 
     def _segment(self, segment: Segment, before: str) -> list[str]:
         for step in segment.steps:
@@ -185,7 +182,7 @@ class WalkedDecoder(Decoder):
     _unpacked: int = 0
     #: Offsets count from the local ``at``.
     _walking: bool = False
-    _counted_runs: set[str] = field(default_factory=set)
+    _counted_runs: set[tuple[str, bool]] = field(default_factory=set)
 
     def statements(self) -> list[str]:
         """Lines of the function body."""
@@ -211,14 +208,17 @@ class WalkedDecoder(Decoder):
     def _segment(self, segment: Segment) -> list[str]:
         run = segment.run
         lines = [] if run is None else self._measured(run, segment)
-        size = str(segment.size) if run is None else _times(run)
-        if segment.terminator:
-            size += " + 1"
-        elif run is None or segment.rest is None:
-            lines += [f"if end - at < {size}:", self._bad_layout]
-        for step in segment.steps:
-            self._step(step)
-        lines += [*self._flushed(), f"at += {size}"]
+        if segment.records is not None:
+            lines = read_lines(segment, self.message.payload, self.place, self._offset(segment.steps[0]))
+        else:
+            size = str(segment.size) if run is None else times(run)
+            if segment.terminator:
+                size += " + 1"
+            elif run is None or segment.rest is None:
+                lines += [f"if end - at < {size}:", self._bad_layout]
+            for step in segment.steps:
+                self._step(step)
+            lines += [*self._flushed(), f"at += {size}"]
         presence = segment.presence
         if presence is None or presence.slot:
             return lines
@@ -282,10 +282,13 @@ class WalkedDecoder(Decoder):
         number = self._get(step.integer, f"{step.name}_raw", at)
         self._put_together(step.integer, number, step.name, self._offset(step))
         run = self.message.payload.run(step.run)
-        if step.run in self._counted_runs:
-            self._values += [f"if {number} != {integers.term_text(step.term)}:", self._bad_layout]
+        if (step.run, step.sized) in self._counted_runs:
+            self._values += [f"if {number} != {integers.count_text(step)}:", self._bad_layout]
             return
-        self._counted_runs.add(step.run)
+        self._counted_runs.add((step.run, step.sized))
+        if step.sized:
+            self._values += sized_lines(step, number, self._bad_layout)
+            return
         own = integers.own_bytes(step.term, number)
         self._values += divided(run, own, step.scale, self._bad_layout)
 
@@ -297,80 +300,24 @@ def _tested(cases: Sequence[Segment]) -> str:
     return attribute(presence.when[0].value)
 
 
-def _times(run: RunStep) -> str:
-    count = f"{run.name}_count"
-    return f"{run.item_size} * {count}" if run.item_size > 1 else count
-
-
 def _python(test: Test) -> Test:
     """The test of an attribute."""
     return Test(attribute(test.value), test.ranges, test.negated)
 
 
-def walked_measure_lines(payload: PayloadPlan) -> list[str]:
-    """Body of the method that finds the size of a walked payload from its beginning, see `measure_lines`."""
-    tested = {test.value for each in payload.segments if each.presence for test in each.presence.when}
-    lines, known = [f"size = {payload.least}", "start = at"], set[str]()
-    for segment in payload.segments:
-        own = [line for step in segment.steps for line in _decided(payload, step, tested, known)]
-        run = segment.run
-        size = str(segment.size) if run is None else _times(run)
-        more = size
-        if run is not None and segment.presence is None and run.length.minimum:
-            more = f"{size} - {run.item_size * run.length.minimum}"
-        presence = segment.presence
-        if run is not None or presence is not None:
-            own.append(f"size += {more}")
-        own.append(f"start += {size}")
-        if presence is None:
-            lines += own
-        else:
-            lines += [f"if {condition(presence.when, '{}_raw')}:", *indented(own)]
-    return [*_without_last_start(lines), "return size"]
+class VariedDecoder(WalkedDecoder):
+    """Collects the code that decodes a record of variable size, at an offset of a payload."""
 
+    def statements(self) -> list[str]:
+        """Lines of the function body."""
+        self._tabled = None
+        self._walking = True
+        lines = ["start = at", "message = _new(cls)"]
+        for segment in self.message.payload.segments:
+            lines += self._segment(segment)
+        used = any("start" in line for line in lines[1:])
+        return [*lines[0 if used else 1 :], "return message, at"]
 
-def _number(integer: Integer, read: str) -> str:
-    """A number that was read: without unused bits, and with its sign."""
-    if integer.size == 1 and integer.bits < 8:
-        read = f"{read} & 0x{integer.mask:X}"
-    if integer.signed and (integer.size == 1 or integer.byteorder is None):
-        return integers.sign_extended(f"({read})", integer.bits)
-    return read
-
-
-def _without_last_start(lines: list[str]) -> list[str]:
-    while lines and lines[-1].lstrip().startswith("start += ") and not lines[-1].startswith(" "):
-        lines = lines[:-1]
-    return lines
-
-
-def _decided(payload: PayloadPlan, step: Step, tested: set[str], known: set[str]) -> Iterable[str]:
-    """The statements that read a step which decides later sizes."""
-    names = {each.name for each in holders((step,))} & tested
-    if step.run in known if isinstance(step, CountStep) else not names:
-        return
-    assert isinstance(step, ValueStep | BitsStep | CountStep)
-    front = step.place.front.fixed
-
-    def at(more: int) -> str:
-        return f"start + {front + more}" if front + more else "start"
-
-    end = at(step.integer.size)
-    yield f"if len(data) < {end}:"
-    yield "    return size"
-    number = integers.read(step.integer, "data", at)
-    if isinstance(step, ValueStep):
-        yield f"{step.name}_raw = {_number(step.integer, number)}"
-    elif isinstance(step, BitsStep):
-        yield f"{step.name}_whole = {number}"
-        for member in step.members:
-            if member.name in tested:
-                taken = f"{step.name}_whole >> {member.shift} & 0x{(1 << member.bits) - 1:X}"
-                signed = member.number.signed
-                yield f"{member.name}_raw = " + (
-                    integers.sign_extended(f"({taken})", member.bits) if signed else taken
-                )
-    else:
-        known.add(step.run)
-        own = integers.own_bytes(step.term, number)
-        yield from divided(payload.run(step.run), own, step.scale, f"    return -({end})")
+    def _offset(self, step: Step) -> str:
+        more = step.place.front.fixed
+        return f"at + {more} - start" if more else "at - start"

@@ -8,7 +8,7 @@ from typing import assert_never
 
 from qlinkgen.model.integer import Integer, unpack_chunks
 from qlinkgen.model.types import Float, Length, Scalar
-from qlinkgen.plan.content import Raw, broken, by_value, default_of
+from qlinkgen.plan.content import Raw, Unsendable, broken, by_value, default_of, pack
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import Clear
 from qlinkgen.plan.payload import (
@@ -91,7 +91,7 @@ class Rule:
                     found |= {each.name: None for each in holders((step,))}
                     continue
             found |= self._of(step)
-        return by_value(plan, found)
+        return _fitting_frame(plan, by_value(plan, found))
 
     def beside(self, envelope: Envelope) -> dict[str, Raw]:
         """The raw values of a frame."""
@@ -126,7 +126,8 @@ class Rule:
                 return {step.name: self.values(step.record.payload)}
             case RecordsStep():
                 count = self._count(step.length)
-                return {step.name: [self.values(step.record.payload) for _ in range(count)]}
+                records = [self.values(step.record.payload) for _ in range(count)]
+                return {step.name: _ended(step, records) if step.last else records}
             case ConstantStep() | ReservedStep() | CountStep():
                 return {}
             case _:
@@ -142,6 +143,49 @@ class Rule:
         for each in conditions(scalar):
             number &= ~each.mask if isinstance(each, Clear) else -1
         return number
+
+
+def _ended(step: RecordsStep, records: list[dict[str, Raw]]) -> list[dict[str, Raw]]:
+    """The records of which only the last one ends an array, as a default one does."""
+    usual = defaults(step.record.payload)
+    others = [each for each in records[:-1] if not step.ends(each)]
+    return [*others, records[-1] if step.ends(records[-1]) else usual]
+
+
+def _fitting_frame(plan: PayloadPlan, values: dict[str, Raw]) -> dict[str, Raw]:
+    """The values with fewer or default records, and shorter runs, until a frame can hold them."""
+    if not is_too_long(plan, values):
+        return values
+    for step in reversed([segment.records for segment in plan.segments if segment.records]):
+        records = values[step.name]
+        if isinstance(step, RecordsStep) and isinstance(records, list):
+            while len(records) > step.length.minimum and is_too_long(plan, values):
+                records = records[1:] if step.last else records[:-1]
+                values = {**values, step.name: records}
+            if is_too_long(plan, values):
+                values = {**values, step.name: [defaults(step.record.payload) for _ in records]}
+        elif isinstance(step, RecordStep) and records is not None and is_too_long(plan, values):
+            values = {**values, step.name: defaults(step.record.payload)}
+    for run in plan.runs:
+        given = values[run.name]
+        if (
+            isinstance(run, BytesStep | ItemsStep)
+            and is_too_long(plan, values)
+            and isinstance(given, bytes | list)
+        ):
+            values = {**values, run.name: given[: run.length.minimum]}
+    return values
+
+
+def is_too_long(plan: PayloadPlan, values: Mapping[str, Raw]) -> bool:
+    """Whether records of variable size are too many for a frame."""
+    if not any(segment.records for segment in plan.segments):
+        return False
+    try:
+        pack(plan, values)
+    except Unsendable:
+        return True
+    return False
 
 
 def whole(step: ItemsStep, count: int) -> int:

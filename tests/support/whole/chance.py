@@ -5,12 +5,23 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from tests.support.whole.reference import Raw, Reference
-from tests.support.whole.reference.document import Message, Number, Record, Records, Value
+from tests.support.whole.reference.document import (
+    Kind,
+    Message,
+    Number,
+    Packed,
+    Record,
+    Records,
+    Run,
+    Slot,
+    Value,
+)
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.special import Packets
-from tests.support.whole.reference.values import holds
+from tests.support.whole.reference.values import Wrong, default_record, encode, holds, meets
 
 
 def mark(reference: Reference) -> int:
@@ -36,14 +47,37 @@ def request(reference: Reference, message: Message, rng: random.Random) -> bytes
 def values(message: Message, rng: random.Random, mark: int) -> dict[str, Raw]:
     """Legal values, often bounds and the stuffed byte."""
     found: dict[str, Raw] = {name: _value(kind, rng, mark) for name, kind in message.beside}
+    for attempt in range(12):
+        inner = _of_slots(message.slots, rng, mark, short=attempt > 1, shortest=attempt > 5, message=message)
+        inner = {name: _between(raw, message.barred) for name, raw in inner.items()}
+        try:
+            encode(message, inner)
+        except Wrong:  # records of variable size can be too many together
+            continue
+        return found | inner
+    return found | default_record(Record(message.slots))
+
+
+def _of_slots(
+    slots: Sequence[Slot],
+    rng: random.Random,
+    mark: int,
+    *,
+    short: bool = False,
+    shortest: bool = False,
+    message: Message | None = None,
+) -> dict[str, Raw]:
+    separated = message is not None and bool(message.separator)
+    found: dict[str, Raw] = {}
     left_out = False
-    for slot in message.slots:
+    for slot in slots:
         sent = holds(slot, {name: raw for name, raw in found.items() if isinstance(raw, int)})
         if slot.optional:
-            left_out = (left_out and not message.separator) or rng.random() < 0.3
+            left_out = (left_out and not separated) or rng.random() < 0.3
             sent = not left_out
-        found |= {name: _value(kind, rng, mark) if sent else None for name, kind in slot.values()}
-    return {name: _between(raw, message.barred) for name, raw in found.items()}
+        for name, kind in slot.values():
+            found[name] = _value(_shorter(kind, short, shortest), rng, mark) if sent else None
+    return found
 
 
 def _between(raw: Raw, barred: bytes) -> Raw:
@@ -53,6 +87,21 @@ def _between(raw: Raw, barred: bytes) -> Raw:
     )
 
 
+def _shorter(kind: Value, short: bool, shortest: bool) -> Value:
+    """The same with fewer records, or items, where they may be few."""
+    if isinstance(kind, Records) and short:
+        most = kind.low if shortest else min(kind.most, kind.low + 1)
+        slots = [replace(each, kind=_shorter_slot(each, shortest)) for each in kind.record.slots]
+        return replace(kind, high=most, record=Record(tuple(slots)))
+    if isinstance(kind, Run) and shortest and not kind.pad:
+        return replace(kind, high=kind.low)
+    return kind
+
+
+def _shorter_slot(slot: Slot, shortest: bool) -> Kind:
+    return slot.kind if isinstance(slot.kind, Packed) else _shorter(slot.kind, True, shortest)
+
+
 def _value(kind: Value, rng: random.Random, mark: int) -> Raw:
     if isinstance(kind, Number):
         return _number(kind, rng, mark)
@@ -60,7 +109,8 @@ def _value(kind: Value, rng: random.Random, mark: int) -> Raw:
         return _record(kind, rng, mark)
     count = rng.choice((kind.low, kind.most, rng.randint(kind.low, kind.most), min(kind.most, kind.low + 2)))
     if isinstance(kind, Records):
-        return [_record(kind.record, rng, mark) for _ in range(count)]
+        records = [_record(kind.record, rng, mark) for _ in range(count)]
+        return _ended(kind, records, rng, mark) if kind.last else records
     if kind.item:
         return [_number(kind.item, rng, mark) for _ in range(count)]
     limit = 0x7F if kind.text else 0xFF
@@ -72,7 +122,18 @@ def _value(kind: Value, rng: random.Random, mark: int) -> Raw:
 
 
 def _record(kind: Record, rng: random.Random, mark: int) -> dict[str, Raw]:
-    return {name: _value(each, rng, mark) for name, each in kind.values()}
+    return _of_slots(kind.slots, rng, mark)
+
+
+def _ended(
+    kind: Records, records: list[dict[str, Raw]], rng: random.Random, mark: int
+) -> list[dict[str, Raw]]:
+    """The records, of which only the last one ends the array; a default record ends it."""
+    others: list[dict[str, Raw]] = []
+    for record in records[:-1]:
+        tries = (record, *(_record(kind.record, rng, mark) for _ in range(20)))
+        others += [each for each in tries if not meets(kind, each)][:1]
+    return [*others, records[-1] if meets(kind, records[-1]) else default_record(kind.record)]
 
 
 def _number(kind: Number, rng: random.Random, mark: int) -> int:

@@ -44,6 +44,8 @@ class Structure:
     spec: Doc
     size: int
     depth: int
+    #: The condition that ends an array.
+    last: Doc = field(default_factory=dict)
 
 
 @dataclass
@@ -60,6 +62,8 @@ class FieldMaker:
     flags: Doc = field(default_factory=dict)
     named: Doc = field(default_factory=dict)
     records: dict[str, Structure] = field(default_factory=dict)
+    #: Records of variable size, or with a bit that ends an array.
+    varied: dict[str, Structure] = field(default_factory=dict)
     #: Fraction of fields that are records.
     structured: float = 0.12
     #: Fraction of messages in which fields may be absent.
@@ -85,12 +89,16 @@ class FieldMaker:
             self.named[name] = self._scalar()[0]
         for _ in range(rng.choice((0, 1, 2, 3))):
             self._new_record()
+        if not (self.shape.word > 1 or self.shape.trimmed or self.shape.kind == "packet"):
+            for _ in range(rng.choice((0, 0, 1, 2))):
+                self._new_varied()
+        records = {**self.records, **self.varied}
         return {
             key: value
             for key, value in (
                 ("enums", self.enums),
                 ("flags", self.flags),
-                ("types", {**self.named, **{name: each.spec for name, each in self.records.items()}}),
+                ("types", {**self.named, **{name: each.spec for name, each in records.items()}}),
             )
             if value
         }
@@ -122,6 +130,86 @@ class FieldMaker:
             name = self.words.name(self.taken)
             about = {"doc": self.words.text()} if self.rng.random() < 0.5 else {}
             self.records[name] = Structure({**about, "fields": made}, size, depth)
+
+    def _new_varied(self) -> None:
+        """A record of variable size, perhaps with others in it, or one that can end an array."""
+        rng, taken = self.rng, set[str]()
+        inner = [name for name, each in self.varied.items() if each.depth == 1]
+        first, last, made, size, depth = self.words.name(taken), Doc(), dict[str, Any](), 1, 1
+        bit, more = self.words.name(taken), self.words.name(taken)
+        made[first] = {"type": "u8", "bits": {bit: "0..2", more: 6}} if rng.random() < 0.6 else "bool"
+        if isinstance(made[first], dict) and rng.random() < 0.6:
+            last = rng.choice(({more: False}, {bit: "0..3"}, {bit: 0, more: "not 1"}))
+        test = f"{first}.{more}" if isinstance(made[first], dict) else first
+        for _ in range(rng.choice((0, 1, 2, 3) if last else (1, 2, 3))):
+            name, roll = self.words.name(taken), rng.random()
+            if roll < 0.5:
+                kind, spec, step = self._variable_kind()
+                if kind in self.records:
+                    depth = max(depth, 1 + self.records[kind].depth)
+                most = rng.choice((1, 2, 5))
+                self._counted(name, f"{kind}[0..{most}]", spec, made, taken=taken)
+                size += 2 + most * step
+            elif roll < 0.7:
+                spec, step = self._plain()
+                made[name] = {**(spec if isinstance(spec, dict) else {"type": spec}), "if": test}
+                size += step
+            elif roll < 0.85 and inner:
+                kind = rng.choice(inner)
+                depth, other = 2, self.varied[kind]
+                made[name] = kind if rng.random() < 0.5 else f"{kind}[2]"
+                if other.last and rng.random() < 0.7:
+                    made[name] = {"type": f"{kind}[1..2]", "last": other.last}
+                size += 2 * other.size
+            else:
+                made[name], step = self._plain()
+                size += step
+        varies = any(
+            isinstance(each, dict) and {"if", "counts", "last"} & each.keys() for each in made.values()
+        )
+        nested = any(str(each["type"] if isinstance(each, dict) else each).partition("[")[0] in self.varied
+                     for each in made.values())  # fmt: skip
+        if depth <= 2 and size <= 60 and (varies or nested or last):
+            self.varied[self.words.name(self.taken)] = Structure({"fields": made}, size, depth, last)
+
+    def _counted(self, name: str, kind: str, spec: Doc, made: Doc, *, taken: set[str]) -> None:
+        """A field after a count of its items, of its bytes, or of its bytes and those of the count."""
+        count, roll = self.words.name(taken), self.rng.random()
+        made[count] = {"type": "u16", "counts": name}
+        if roll < 0.6:
+            made[count] |= {"counts_in": "bytes"} if roll < 0.3 else {"counts": [count, name]}
+        made[name] = {"type": kind, **spec}
+
+    def _varied_field(self, name: str, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
+        """One record of variable size, or an array of them: counted, of constant length, or to its end."""
+        rng = self.rng
+        kind = rng.choice(list(self.varied))
+        record = self.varied[kind]
+        opened = any(self._is_open(each, made) for _, each in made)
+        rows = any(isinstance(each, dict) and "packed" in each and ".." in each["type"] for _, each in made)
+        rows = rows or any(isinstance(each, dict) and "terminator" in each for _, each in made)
+        if opened or rows:
+            return
+        # Some messages can be longer than the frame allows.
+        size = rng.choice((record.size, record.size, max(1, record.size // 4)))
+        most = min(rng.choice((1, 2, 3, 8)), (room.left - room.least - 4) // size)
+        if most < 1:
+            return
+        roll = rng.random()
+        if record.last and most > 1 and roll < 0.6:
+            made.append((name, {"type": f"{kind}[1..{most}]", "last": record.last}))
+        elif roll < 0.3:
+            most = min(most, 2)
+            made.append((name, rng.choice((kind, f"{kind}[{most}]"))))
+        elif roll < 0.5 and room.open_end:
+            made.append((name, f"{kind}[{rng.choice((0, 0, 1))}..{most}]"))
+            room.open_end = False
+        else:
+            for unit in rng.choice((("items",), ("bytes",), ("bytes",), ("items", "bytes"))):
+                number = most * (record.size if unit == "bytes" else 1)
+                self._count(name, unit, number, made, len(made), taken=taken, room=room)
+            made.append((name, {"type": f"{kind}[{rng.choice((0, 0, 1, most - 1))}..{most}]"}))
+        room.left -= size * most
 
     def forget_unused(self, document: Doc) -> None:
         """Remove unused types, so that lint does not warn."""
@@ -184,6 +272,8 @@ class FieldMaker:
     def _add_choice(self, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
         """A value whose type an earlier field decides, at the end of the payload."""
         rng = self.rng
+        if any(self._is_varied(each) for _, each in made):
+            return
         specs = [spec for _, spec in made if isinstance(spec, dict)]
         if any(self._is_open(each, made) for _, each in made) or any("optional" in each for each in specs):
             return
@@ -316,7 +406,10 @@ class FieldMaker:
             counting = isinstance(spec, dict) and spec.get("counts_in") == "bytes"
             if not counting or spec["type"] != "u16" or rng.random() < 0.3:
                 continue
-            chosen = [each for each in specs if self._is_always(specs[each]) and rng.random() < 0.5]
+            always = [
+                each for each in specs if self._is_always(specs[each]) and not self._is_varied(specs[each])
+            ]
+            chosen = [each for each in always if rng.random() < 0.5]
             several = [*chosen, spec["counts"]]
             rng.shuffle(several)
             made[at] = (name, {**spec, "counts": several})
@@ -330,6 +423,10 @@ class FieldMaker:
             return False
         kind = str(spec["type"] if isinstance(spec, dict) else spec)
         return ".." not in kind and "[]" not in kind and kind not in ("bytes", "text")
+
+    def _is_varied(self, spec: Any) -> bool:
+        kind = str(spec["type"] if isinstance(spec, dict) else spec)
+        return kind.partition("[")[0] in self.varied
 
     def _add_conditions(self, made: list[tuple[str, Any]], kept: set[str], taken: set[str]) -> None:
         """Conditions on some fields, and optional fields at the end; `kept` fields stay as they are."""
@@ -357,7 +454,12 @@ class FieldMaker:
         while order and opened == len(made) and self.shape.has_length and rng.random() < 0.4:
             name = order.pop()
             run = ".." in specs[name]["type"] or specs[name]["type"] in ("bytes", "text")
-            if run or name in kept or {"if", "const", "reserved", "counts"} & specs[name].keys():
+            if (
+                run
+                or name in kept
+                or self._is_varied(specs[name])
+                or {"if", "const", "reserved", "counts"} & specs[name].keys()
+            ):
                 break
             specs[name]["optional"] = True
         made[:] = [(name, specs[name] if len(specs[name]) > 1 else spec) for name, spec in made]
@@ -421,6 +523,9 @@ class FieldMaker:
         name = self.words.name(taken)
         if roll < self.variable and not room.fixed:
             self._variable(name, made, taken, room)
+            return
+        if self.varied and not room.fixed and self.rng.random() < 2 * self.structured:
+            self._varied_field(name, made, taken, room)
             return
         if self.records and self.rng.random() < self.structured:
             spec, size = self._of_record()
@@ -771,7 +876,7 @@ class FieldMaker:
             return
         kind, spec, bits = self._bits_in_a_row()
         most = min(rng.choice((1, 3, 8, 17, 40, 250)), (room.left - room.least - 6) * 8 // bits)
-        if most < 2:
+        if most < 2 or any(self._is_varied(each) for _, each in made):
             return
         opened = next((at for at, (_, each) in enumerate(made) if self._is_open(each, made)), len(made))
         self._count(name, "items", most, made, opened, taken=taken, room=room)
@@ -855,7 +960,7 @@ class FieldMaker:
         rng = self.rng
         most = min(rng.choice((1, 3, 8, 40)), room.left - room.least - 1)
         rows = any("packed" in spec and ".." in spec["type"] for _, spec in made if isinstance(spec, dict))
-        if most < 1 or rows:
+        if most < 1 or rows or any(self._is_varied(each) for _, each in made):
             return
         low = rng.choice((0, 0, min(1, most - 1)))
         spec: Doc = {"type": f"text[{low}..{most}]", "terminator": rng.choice(("00", "0D", "20"))}
@@ -868,6 +973,8 @@ class FieldMaker:
     def _is_open(self, spec: Any, made: list[tuple[str, Any]]) -> bool:
         counts = [each["counts"] for _, each in made if isinstance(each, dict) and "counts" in each]
         names = {name for each in counts for name in ([each] if isinstance(each, str) else each)}
+        if isinstance(spec, dict) and "last" in spec:
+            return False
         kind = str(spec["type"] if isinstance(spec, dict) else spec)
         kind = kind.replace("[]", "[..]")
         if isinstance(spec, dict) and "terminator" in spec:

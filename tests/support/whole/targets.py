@@ -27,7 +27,7 @@ from qlinkgen.plan.receive import PacketReceiver as PlannedPackets
 from qlinkgen.plan.receive import receiver
 from tests.support.cdriver import Driver
 from tests.support.whole.reference import Event, Raw, Reference, Seen, Wrong
-from tests.support.whole.reference.document import Message, Number, Record, Records, Run, Value
+from tests.support.whole.reference.document import Message, Number, Record, Records, Run, Slot, Value
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.kinds import Kinds
 from tests.support.whole.reference.special import Packets
@@ -408,16 +408,7 @@ class CTarget(Target):
         address, *found = self._ask("decode", message.name, wire.hex() or "-", *context)
         words = iter(found)
         values: dict[str, Raw] = {name: told(kind, _raw(kind, words)) for name, kind in message.beside}
-        for slot in message.slots:
-            if slot.choice:
-                sent = holds(slot, {name: raw for name, raw in values.items() if isinstance(raw, int)})
-                values |= {
-                    name: told(kind, _raw(kind, words)) if sent else None for name, kind in slot.values()
-                }
-                continue
-            absent = slot.conditional and slot.values() and next(words) == "0"
-            read = {name: told(kind, _raw(kind, words)) for name, kind in slot.values()}
-            values |= dict.fromkeys(read) if absent else read
+        values |= _raw_slots(message.slots, words)
         assert not list(words)
         return Seen(message.name, int(address) if message.addresses else None, values)
 
@@ -450,7 +441,11 @@ def _message_words(message: Message, given: Mapping[str, Any]) -> Iterator[str]:
     """The words of all values; a field that may be absent has one more, which tells whether it is present."""
     for name, number in message.beside:
         yield from _words(number, given[name])
-    for slot in message.slots:
+    yield from _slot_words(message.slots, given)
+
+
+def _slot_words(slots: Sequence[Slot], given: Mapping[str, Any]) -> Iterator[str]:
+    for slot in slots:
         values = slot.values()
         if slot.choice:
             for name, kind in values:
@@ -466,8 +461,7 @@ def _message_words(message: Message, given: Mapping[str, Any]) -> Iterator[str]:
 def _words(kind: Value, raw: Any) -> Iterator[str]:
     """The words of a value: one, those of a record, or the number of records and those of each."""
     if isinstance(kind, Record):
-        for name, each in kind.values():
-            yield from _words(each, raw[name])
+        yield from _slot_words(kind.slots, raw)
     elif isinstance(kind, Records):
         yield str(len(raw))
         for record in raw:
@@ -495,7 +489,20 @@ def _raw(kind: Value, words: Iterator[str]) -> Raw:
 
 
 def _raw_record(kind: Record, words: Iterator[str]) -> dict[str, Raw]:
-    return {name: _raw(each, words) for name, each in kind.values()}
+    return _raw_slots(kind.slots, words)
+
+
+def _raw_slots(slots: Sequence[Slot], words: Iterator[str]) -> dict[str, Raw]:
+    values: dict[str, Raw] = {}
+    for slot in slots:
+        if slot.choice:
+            sent = holds(slot, {name: raw for name, raw in values.items() if isinstance(raw, int)})
+            values |= {name: told(kind, _raw(kind, words)) if sent else None for name, kind in slot.values()}
+            continue
+        absent = slot.conditional and slot.values() and next(words) == "0"
+        read = {name: told(kind, _raw(kind, words)) for name, kind in slot.values()}
+        values |= dict.fromkeys(read) if absent else read
+    return values
 
 
 def _bytes(word: str) -> bytes:

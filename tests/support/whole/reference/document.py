@@ -147,8 +147,18 @@ class Record:
 
     @property
     def size(self) -> int:
-        """Size on the wire."""
-        return sum(slot.most_bytes for slot in self.slots)
+        """Maximum size on the wire."""
+        return most_bytes(self.slots)
+
+    @property
+    def least(self) -> int:
+        """Minimum size on the wire."""
+        return sum(slot.least_bytes for slot in self.slots if not slot.conditional)
+
+    @property
+    def constant(self) -> bool:
+        """Whether its size is constant."""
+        return all(slot.fixed and not slot.conditional for slot in self.slots)
 
     def values(self) -> Iterator[tuple[str, Value]]:
         """Values in wire order."""
@@ -163,6 +173,8 @@ class Records:
     low: int
     high: int | None
     packed: str = ""
+    #: Tests of the record that ends the array.
+    last: tuple[Test, ...] = ()
 
     @property
     def step(self) -> int:
@@ -175,7 +187,7 @@ class Records:
 
     def items_in(self, size: int) -> int:
         """Number of records that fit."""
-        return size // self.step
+        return size // self.record.least
 
     @property
     def most(self) -> int:
@@ -224,12 +236,25 @@ class Slot:
     @property
     def fixed(self) -> bool:
         """Whether its size is constant, where it is present."""
+        if self.walked:
+            return False
         return not isinstance(self.kind, Run | Records) or self.kind.low == self.kind.high
+
+    @property
+    def walked(self) -> bool:
+        """Whether it has records that are read one by one."""
+        if isinstance(self.kind, Records):
+            return bool(self.kind.last) or not self.kind.record.constant
+        return isinstance(self.kind, Record) and not self.kind.constant
 
     @property
     def least_bytes(self) -> int:
         """Minimum size on the wire."""
         kind = self.kind
+        if isinstance(kind, Record):
+            return kind.least
+        if isinstance(kind, Records):
+            return kind.low * kind.record.least
         return kind.bytes_of(kind.low) if isinstance(kind, Run | Records) else size_of(kind)
 
     @property
@@ -242,6 +267,10 @@ class Slot:
 def most_bytes(slots: Iterable[Slot], along: Slot | None = None) -> int:
     """Maximum size of slots, of those that may be present `along` with another one."""
     kept = [slot for slot in slots if along is None or not _apart(slot, along)]
+    if along is not None:  # records of variable size may leave more
+        walked = [slot for slot in kept if slot.walked]
+        kept = [slot for slot in kept if not slot.walked]
+        return most_bytes(kept) + sum(slot.least_bytes for slot in walked if not slot.conditional)
     size = sum(slot.most_bytes for slot in kept if not slot.when)
     for name in {slot.when[0][0] for slot in kept if slot.when}:
         group = [slot for slot in kept if slot.when and slot.when[0][0] == name]
@@ -300,6 +329,8 @@ class Message:
     barred: bytes = b""
     #: Kinds of frame that carry it, if there are several.
     frames: tuple[str, ...] = ()
+    #: Maximum size of a payload in the frame.
+    limit: int | None = None
 
     def values(self) -> Iterator[tuple[str, Value]]:
         """Values in wire order, those of the frame first."""
@@ -317,14 +348,20 @@ class Message:
 
     @property
     def walked(self) -> bool:
-        """Whether fields may be absent."""
-        return any(slot.conditional or (isinstance(slot.kind, Run) and slot.kind.end) for slot in self.slots)
+        """Whether the places of fields depend on values."""
+        return any(
+            slot.conditional or slot.walked or (isinstance(slot.kind, Run) and slot.kind.end)
+            for slot in self.slots
+        )
 
     @property
     def sizes(self) -> tuple[int, int]:
         """Minimum and maximum size of the payload."""
         always = [slot for slot in self.slots if not slot.conditional]
-        return sum(slot.least_bytes for slot in always), most_bytes(self.slots)
+        most = most_bytes(self.slots)
+        if self.limit is not None and any(slot.walked for slot in self.slots):
+            most = min(most, self.limit)
+        return sum(slot.least_bytes for slot in always), most
 
     def allows(self, address: int) -> bool:
         """Whether the address is legal for the message."""
@@ -454,9 +491,9 @@ class Fields:
     """Builds fields from their mappings."""
 
     def __init__(self, document: Doc, payload_most: int) -> None:
-        """`payload_most` limits fields without a bound."""
+        """`payload_most` limits fields without a bound, and all fields together."""
         self._document = document
-        self._most = payload_most
+        self.most = payload_most
         self._order = document.get("byteorder", "big")
 
     def build(self, fields: Mapping[str, Any]) -> tuple[Slot, ...]:
@@ -467,7 +504,7 @@ class Fields:
             slot for slot in slots if not isinstance(slot.kind, Run | Records) or slot.kind.high is not None
         ]
         return tuple(
-            _bounded(slot, self._most - most_bytes(bounded, along=slot), counts.get(slot.name))
+            _bounded(slot, self.most - most_bytes(bounded, along=slot), counts.get(slot.name))
             for slot in slots
         )
 
@@ -573,11 +610,14 @@ class Fields:
     def _slot(self, name: str, spec: Doc) -> Slot:
         base, bracket, count = spec["type"].replace(" ", "").partition("[")
         if base in self._document.get("types", {}):
-            record = Record(self._slots(self._document["types"][base]["fields"]))
+            record = Record(self.build(self._document["types"][base]["fields"]))
             if not bracket:
                 return Slot(name, record)
             low, high = whole_span(count.rstrip("]")) if count.rstrip("]") else (0, None)
-            return Slot(name, Records(record, low, high))
+            last = self._conditional(
+                Slot(name, record), {"if": spec.get("last", {})}, list(record.slots)
+            ).when
+            return Slot(name, Records(record, low, high, last=last))
         if base in ("bytes", "text") or bracket:
             return Slot(name, self._run(base, count.rstrip("]"), spec))
         number = self._number(base, spec)
@@ -830,7 +870,7 @@ def _messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, 
         found += _replies(name, merged, document, fields, {each.name for each in found}, addressed=addressed)
     for name, spec in document.get("messages", {}).items():
         found.append(single(name, spec, document, fields, addressed))
-    return tuple(found)
+    return tuple(replace(each, limit=fields.most) for each in found)
 
 
 def single(name: str, spec: Doc, document: Doc, fields: Fields, addressed: bool) -> Message:

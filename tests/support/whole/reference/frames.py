@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,8 +17,11 @@ from tests.support.whole.reference.document import (
     Message,
     Number,
     Packed,
+    Record,
     Records,
     Run,
+    Slot,
+    Test,
     bits_of,
     bits_of_type,
     byte_pieces,
@@ -27,7 +30,7 @@ from tests.support.whole.reference.document import (
     size_of,
     whole_span,
 )
-from tests.support.whole.reference.values import Raw, Wrong, get, holds, items_of, note, put
+from tests.support.whole.reference.values import Raw, Wrong, get, holds, items_of, met, note, put
 from tests.support.whole.reference.values import check as check_range
 
 
@@ -680,25 +683,85 @@ class Splitter:
 
 def _measured(message: Message, take: Callable[[int], bytes], cursor: Cursor) -> bytes:
     """The bytes of a payload whose end follows from its counts."""
-    counted: dict[str, int] = {}
-    numbers: dict[str, int] = {}
-    payload = b""
-    for slot in message.slots:
-        if not holds(slot, numbers):
-            continue
+    taker = _Taker(take)
+    try:
+        size = _Measure(message.slots, taker, most=message.sizes[1]).run(0)
+        if size > message.sizes[1]:
+            raise Wrong("length")
+    except Wrong:
+        raise Refused("length", cursor.at) from None
+    return taker.upto(size)
+
+
+class _Taker:
+    """Takes bytes of a payload as far as they decide."""
+
+    def __init__(self, take: Callable[[int], bytes]) -> None:
+        self._take, self._data = take, b""
+
+    def upto(self, end: int) -> bytes:
+        """The bytes up to an offset."""
+        self._data += self._take(max(0, end - len(self._data)))
+        return self._data[:end]
+
+
+class _Measure:
+    """Finds the end of a message or record field by field."""
+
+    def __init__(
+        self, slots: Sequence[Slot], taker: _Taker, last: Sequence[Test] = (), most: int = 1 << 32
+    ) -> None:
+        self._slots, self._taker, self._most = slots, taker, most
+        tests = [test for slot in slots for test in slot.when]
+        self._tested = {name for name, *_ in (*tests, *last)}
+        self.numbers: dict[str, int] = {}
+        self._counted: dict[str, int] = {}
+        self._sizes: dict[str, int] = {}
+
+    def run(self, at: int) -> int:
+        """The offset of its end."""
+        for slot in self._slots:
+            if holds(slot, self.numbers):
+                at = self._records(slot, at) if slot.walked else self._plain(slot, at)
+        return at
+
+    def _plain(self, slot: Slot, at: int) -> int:
         kind = slot.kind
-        size = (
-            kind.bytes_of(counted.get(slot.name, kind.most))
-            if isinstance(kind, Run | Records)
-            else size_of(kind)
-        )
-        data = take(size)
-        payload += data
-        note(slot, data, numbers)
-        if slot.counts and slot.counts not in counted:
-            assert isinstance(kind, Number)
-            try:
-                counted[slot.counts] = items_of(message, slot, get(kind.pieces, data))
-            except Wrong:
-                raise Refused("length", cursor.at) from None
-    return payload
+        if isinstance(kind, Run | Records):
+            return at + kind.bytes_of(self._counted.get(slot.name, kind.most))
+        end = at + size_of(kind)
+        names = {name for name, *_ in kind.members} if isinstance(kind, Packed) else {slot.name}
+        if not slot.counts and not names & self._tested:
+            return end
+        data = self._taker.upto(end)[at:]
+        note(slot, data, self.numbers)
+        if slot.counts:
+            self._count(slot, data)
+        return end
+
+    def _count(self, slot: Slot, data: bytes) -> None:
+        counted = next(each for each in self._slots if each.name == slot.counts)
+        assert isinstance(slot.kind, Number)
+        raw = get(slot.kind.pieces, data)
+        if counted.walked and slot.counts_in == "bytes":
+            self._sizes.setdefault(slot.counts, raw - slot.more)
+            if not counted.least_bytes <= raw - slot.more <= self._most:
+                raise Wrong("length")
+        elif slot.counts not in self._counted:
+            self._counted[slot.counts] = items_of(self._slots, slot, raw)
+
+    def _records(self, slot: Slot, at: int) -> int:
+        if slot.name in self._sizes:
+            return at + self._sizes[slot.name]
+        kind = slot.kind
+        assert isinstance(kind, Record | Records)
+        if isinstance(kind, Record):
+            return _Measure(kind.slots, self._taker).run(at)
+        for _ in range(self._counted.get(slot.name, kind.most)):
+            own = _Measure(kind.record.slots, self._taker, kind.last)
+            at = own.run(at)
+            if met(kind.last, own.numbers):
+                return at
+        if kind.last:
+            raise Wrong("length")
+        return at

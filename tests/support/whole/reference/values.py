@@ -16,6 +16,7 @@ from tests.support.whole.reference.document import (
     Records,
     Run,
     Slot,
+    Test,
     Value,
     size_of,
 )
@@ -61,14 +62,17 @@ def default(kind: Value) -> Raw:
     if isinstance(kind, Number):
         return kind.default
     if isinstance(kind, Record):
-        return _default_record(kind)
+        return default_record(kind)
     if isinstance(kind, Records):
-        return [_default_record(kind.record) for _ in range(kind.low)]
+        return [default_record(kind.record) for _ in range(kind.low)]
     return list(kind.default) if kind.item else bytes(kind.default)
 
 
-def _default_record(kind: Record) -> dict[str, Raw]:
-    return {name: default(each) for name, each in kind.values()}
+def default_record(kind: Record) -> dict[str, Raw]:
+    """The defaults of a record."""
+    return {
+        name: default(each) if slot.given else None for slot in kind.slots for name, each in slot.values()
+    }
 
 
 def encode(message: Message, values: Mapping[str, Raw]) -> bytes:
@@ -76,6 +80,8 @@ def encode(message: Message, values: Mapping[str, Raw]) -> bytes:
     if message.separator:
         return _texts(message, values)
     data = _fields(message.slots, values)
+    if len(data) > message.sizes[1]:
+        raise Wrong("range", "too long")
     while message.trim is not None and len(data) > message.trim and data[-1] == 0:
         data = data[:-1]
     return data
@@ -152,11 +158,7 @@ def _encoded(slots: Sequence[Slot], slot: Slot, values: Mapping[str, Raw]) -> by
     if isinstance(kind, Record):
         return _fields(kind.slots, values[slot.name])  # type: ignore[arg-type]
     if isinstance(kind, Records):
-        records = values[slot.name]
-        assert isinstance(records, Sequence)
-        if not kind.low <= len(records) <= kind.most:
-            raise Wrong("range", f"{len(records)} records")
-        return b"".join(_fields(kind.record.slots, each) for each in records)  # type: ignore[arg-type]
+        return _encoded_records(kind, values[slot.name])
     if isinstance(kind, Packed):
         raw = 0
         for name, shift, number in kind.members:
@@ -166,12 +168,43 @@ def _encoded(slots: Sequence[Slot], slot: Slot, values: Mapping[str, Raw]) -> by
         return _encoded_run(kind, values[slot.name])
     if slot.role == "count":
         counted = next(each.kind for each in slots if each.name == slot.counts)
-        given = values[slot.counts]
-        assert isinstance(counted, Run | Records)
-        assert not isinstance(given, int | None)
-        told = counted.bytes_of(len(given)) if slot.counts_in == "bytes" else len(given)
-        return put(kind.pieces, told + slot.more)
+        return put(kind.pieces, _told(slot, kind, counted, values[slot.counts]))
     return _put(kind, _number(kind, values[slot.name]) if slot.role == "value" else kind.default)
+
+
+def _encoded_records(kind: Records, records: Raw) -> bytes:
+    assert isinstance(records, Sequence)
+    if not kind.low <= len(records) <= kind.most:
+        raise Wrong("range", f"{len(records)} records")
+    ends = [meets(kind, each) for each in records]  # type: ignore[arg-type]
+    if kind.last and ends != [*[False] * (len(ends) - 1), True]:
+        raise Wrong("range", "the last record")
+    return b"".join(_fields(kind.record.slots, each) for each in records)  # type: ignore[arg-type]
+
+
+def _told(slot: Slot, number: Number, counted: Kind, given: Raw) -> int:
+    """The number that a count tells."""
+    assert isinstance(counted, Run | Records)
+    assert not isinstance(given, int | None)
+    told = counted.bytes_of(len(given)) if slot.counts_in == "bytes" else len(given)
+    if isinstance(counted, Records) and slot.counts_in == "bytes" and not counted.record.constant:
+        told = len(_encoded_records(counted, given))
+    if told + slot.more >= 1 << number.bits - number.signed:
+        raise Wrong("range", "a count")
+    return told + slot.more
+
+
+def meets(kind: Records, values: Mapping[str, Raw]) -> bool:
+    """Whether a record is one that ends its array."""
+    return met(kind.last, {name: raw for name, raw in values.items() if isinstance(raw, int)})
+
+
+def met(tests: Sequence[Test], numbers: Mapping[str, int]) -> bool:
+    """Whether there are tests, and all hold."""
+    return bool(tests) and all(
+        any(low <= numbers[name] <= high for low, high in ranges) != excluded
+        for name, ranges, excluded in tests
+    )
 
 
 def _put(number: Number, raw: int) -> bytes:
@@ -256,11 +289,11 @@ def decode(message: Message, payload: bytes) -> dict[str, Raw]:
     return values
 
 
-def _segments(message: Message) -> list[list[Slot]]:
+def _segments(slots: Sequence[Slot]) -> list[list[Slot]]:
     """Consecutive fields of constant size that are always present, and each other field alone."""
     segments: list[list[Slot]] = []
     joined = False
-    for slot in message.slots:
+    for slot in slots:
         if joined and slot.fixed and not slot.conditional:
             segments[-1].append(slot)
         else:
@@ -270,39 +303,102 @@ def _segments(message: Message) -> list[list[Slot]]:
 
 
 def _walked(message: Message, payload: bytes) -> dict[str, Raw]:
-    """The values of a payload in which fields may be absent: the size of a segment, then its values."""
-    values: dict[str, Raw] = {}
-    numbers: dict[str, int] = {}
-    counted: dict[str, int] = {}
-    at = 0
-    for segment in _segments(message):
-        first, left = segment[0], len(payload) - at
-        if not (left > 0 if first.optional else holds(first, numbers)):
-            values |= dict.fromkeys(name for name, _ in first.values())
-            continue
-        sizes = [_size(slot, counted) for slot in segment]
+    """The values of a payload in which the places of fields depend on values."""
+    values, at = _Walk(message.slots, payload, message.sizes[1]).run(0, len(payload))
+    if at != len(payload):
+        raise Wrong("length", "bytes are left")
+    return values
+
+
+class _Walk:
+    """Reads a message or record: the size of each segment, then its values."""
+
+    def __init__(self, slots: Sequence[Slot], payload: bytes, most: int = 1 << 32) -> None:
+        self.slots, self._payload, self._most = slots, payload, most
+        self.numbers: dict[str, int] = {}
+        self._counted: dict[str, int] = {}
+        #: Bytes of records of variable size.
+        self._sizes: dict[str, int] = {}
+
+    def run(self, at: int, end: int) -> tuple[dict[str, Raw], int]:
+        """The values, and the offset of the end."""
+        values: dict[str, Raw] = {}
+        for segment in _segments(self.slots):
+            first, left = segment[0], end - at
+            if not (left > 0 if first.optional else holds(first, self.numbers)):
+                values |= dict.fromkeys(name for name, _ in first.values())
+            elif first.walked:
+                values[first.name], at = self._records(first, at, end)
+            else:
+                found, at = self._plain(segment, at, left)
+                values |= found
+        return values, at
+
+    def _plain(self, segment: Sequence[Slot], at: int, left: int) -> tuple[dict[str, Raw], int]:
+        first, values = segment[0], dict[str, Raw]()
+        sizes = [_size(slot, self._counted) for slot in segment]
         if isinstance(first.kind, Run) and first.kind.end:
-            sizes = [_ended(first.kind, payload[at:])]
+            sizes = [_ended(first.kind, self._payload[at:])]
         elif sizes == [None]:
-            behind = message.slots[message.slots.index(first) + 1 :]
-            sizes = [left - _behind([slot for slot in behind if not slot.conditional], counted)]
+            sizes = [left - self._behind(first)]
             _demand(first.kind, sizes[0] or 0)
         if sum(size or 0 for size in sizes) > left:
             raise Wrong("length", first.name)
         for slot, size in zip(segment, sizes, strict=True):
-            data = payload[at : at + (size or 0)]
+            data = self._payload[at : at + (size or 0)]
             kind = slot.kind
             number = None
             if isinstance(kind, Run | Records) and not slot.fixed:
                 number = len(data) // kind.step
             values |= _decoded(slot, data, number)
-            note(slot, data, numbers)
+            note(slot, data, self.numbers)
             if slot.counts:
-                _note(message, slot, data, counted)
+                self._count(slot, data)
             at += len(data)
-    if at != len(payload):
-        raise Wrong("length", "bytes are left")
-    return values
+        return values, at
+
+    def _behind(self, slot: Slot) -> int:
+        behind = self.slots[self.slots.index(slot) + 1 :]
+        return _behind([each for each in behind if not each.conditional], self._counted)
+
+    def _count(self, slot: Slot, data: bytes) -> None:
+        counted = next(each for each in self.slots if each.name == slot.counts)
+        if slot.counts_in != "bytes" or not counted.walked:
+            _note(self.slots, slot, data, self._counted)
+            return
+        assert isinstance(slot.kind, Number)
+        assert isinstance(counted.kind, Records)
+        size = get(slot.kind.pieces, data) - slot.more
+        if not counted.least_bytes <= size <= self._most or size != self._sizes.setdefault(slot.counts, size):
+            raise Wrong("length", f"size {size}")
+
+    def _records(self, slot: Slot, at: int, end: int) -> tuple[Raw, int]:
+        kind = slot.kind
+        if isinstance(kind, Record):
+            values, at = _Walk(kind.slots, self._payload).run(at, end)
+            return values, at
+        assert isinstance(kind, Records)
+        wanted = self._counted.get(slot.name, kind.low if kind.low == kind.most else None)
+        limit = end
+        if slot.name in self._sizes:
+            limit = at + self._sizes[slot.name]
+        elif wanted is None and not kind.last:
+            limit = end - self._behind(slot)
+        if not at <= limit <= end:
+            raise Wrong("length", slot.name)
+        found: list[Mapping[str, Raw]] = []
+        ended = False
+        while not ended and (len(found) < wanted if wanted is not None else kind.last or at < limit):
+            if len(found) == kind.most:
+                raise Wrong("length", "too many records")
+            own = _Walk(kind.record.slots, self._payload)
+            values, at = own.run(at, limit)
+            found.append(values)
+            ended = met(kind.last, own.numbers)
+        exact = slot.name in self._sizes or (wanted is None and not kind.last)
+        if len(found) < kind.low or (exact and at != limit):
+            raise Wrong("length", slot.name)
+        return found, at
 
 
 def _ended(kind: Run, left: bytes) -> int:
@@ -405,7 +501,7 @@ def _cut(message: Message, payload: bytes) -> list[tuple[Slot, bytes, int | None
         if len(data) < size or size < 0:
             raise Wrong("length", slot.name)
         if slot.counts:
-            _note(message, slot, data, counted)
+            _note(message.slots, slot, data, counted)
         cut.append((slot, data, counted.get(slot.name)))
         at += size
     if at != len(payload):
@@ -434,23 +530,23 @@ def _demand(kind: Kind, size: int) -> None:
         raise Wrong("length", "the rest")
 
 
-def _note(message: Message, slot: Slot, data: bytes, counted: dict[str, int]) -> None:
+def _note(slots: Sequence[Slot], slot: Slot, data: bytes, counted: dict[str, int]) -> None:
     """Read a count; a second one must agree."""
     assert isinstance(slot.kind, Number)
     raw = get(slot.kind.pieces, data)
-    run = next(each.kind for each in message.slots if each.name == slot.counts)
+    run = next(each.kind for each in slots if each.name == slot.counts)
     if isinstance(run, Run) and run.packed and slot.counts_in == "bytes" and slot.counts in counted:
         if raw != run.bytes_of(counted[slot.counts]) + slot.more:
             raise Wrong("length", "counts differ")
         return
-    items = items_of(message, slot, raw)
+    items = items_of(slots, slot, raw)
     if counted.setdefault(slot.counts, items) != items:
         raise Wrong("length", "counts differ")
 
 
-def items_of(message: Message, slot: Slot, raw: int) -> int:
+def items_of(slots: Sequence[Slot], slot: Slot, raw: int) -> int:
     """The number of items from a count. Raises Wrong if it is illegal for the field."""
-    kind = next(each.kind for each in message.slots if each.name == slot.counts)
+    kind = next(each.kind for each in slots if each.name == slot.counts)
     assert isinstance(kind, Run | Records)
     raw -= slot.more
     if kind.packed and slot.counts_in == "bytes":

@@ -1,0 +1,171 @@
+"""Generates the statements that find the size of a walked payload in a frame without a length."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from qlinkgen.backends.python import integers
+from qlinkgen.backends.python.decode import divided
+from qlinkgen.backends.python.layout import indented
+from qlinkgen.backends.python.varied import condition
+from qlinkgen.model.condition import Test
+from qlinkgen.model.integer import Integer
+from qlinkgen.plan.expr import Within
+from qlinkgen.plan.payload import (
+    BitsStep,
+    CountStep,
+    PayloadPlan,
+    RecordsStep,
+    RecordStep,
+    RunStep,
+    Segment,
+    Step,
+    ValueStep,
+    holders,
+    renamed,
+    renamed_tests,
+)
+
+
+def walked_measure_lines(payload: PayloadPlan) -> list[str]:
+    """Body of the method that finds the size of a walked payload from its beginning, see `measure_lines`.
+
+    ``size`` is that of the payload as far as it is known, ``start`` the offset of the next segment, and
+    ``read`` the end of the last number that decides: where a payload turns out to be too long.
+    """
+    bounded = any(segment.records for segment in payload.segments)
+    measure = _Measure(bounded=bounded)
+    lines = measure.lines(payload.segments, ())
+    if bounded:
+        most = [f"if size > {payload.most}:", "    return -read"]
+        return [f"size = {payload.least}", "read = start = at", *lines, *most, "return size"]
+    return [f"size = {payload.least}", "start = at", *_without_last_start(lines), "return size"]
+
+
+class _Measure:
+    """Collects the statements, those of records inside of others with other locals."""
+
+    def __init__(self, *, bounded: bool, depth: int = 0) -> None:
+        """``bounded``: note the end of numbers that decide."""
+        self._bounded = bounded
+        self._depth = depth
+
+    def lines(self, segments: Sequence[Segment], last: Sequence[Test]) -> list[str]:
+        """The statements for a message or record; ``last`` tests values of a record."""
+        tests = [test for each in segments if each.presence for test in each.presence.when]
+        self._tested = {test.value for test in (*tests, *last)}
+        self._known = set[tuple[str, bool]]()
+        self._steps = [step for each in segments for step in each.steps]
+        lines: list[str] = []
+        for segment in segments:
+            own = self._segment(segment)
+            presence = segment.presence
+            lines += (
+                own if presence is None else [f"if {condition(presence.when, '{}_raw')}:", *indented(own)]
+            )
+        return lines
+
+    def _segment(self, segment: Segment) -> list[str]:
+        if segment.records is not None:
+            return self._records(segment.records, present=segment.presence is None)
+        lines = [line for step in segment.steps for line in self._decided(step)]
+        run = segment.run
+        size = str(segment.size) if run is None else times(run)
+        more = size
+        if run is not None and segment.presence is None and run.length.minimum:
+            more = f"{size} - {run.item_size * run.length.minimum}"
+        if run is not None or segment.presence is not None:
+            lines.append(f"size += {more}")
+        return [*lines, f"start += {size}"]
+
+    def _records(self, step: RecordStep | RecordsStep, *, present: bool) -> list[str]:
+        """The statements for walked records; some of them are in the minimum of what is ``present``."""
+        own, suffix = step.record.payload, f"_{self._depth + 1}"
+        if isinstance(step, RecordStep):
+            more = [] if present else [f"size += {own.least}"]
+            inner = _Measure(bounded=True, depth=self._depth + 1)
+            return [*more, *inner.lines(renamed(step.record.segments, suffix), ())]
+        counted = step.length.minimum if present else 0
+        if (step.name, True) in self._known:
+            more = [f"size += {step.name}_bytes - {counted * own.least}"]
+            return [*more, f"start += {step.name}_bytes"]
+        last = renamed_tests(step.last, suffix)
+        inner = _Measure(bounded=True, depth=self._depth + 1)
+        lines = [f"size += {own.least}"]
+        if counted:
+            lines = [f"if index{suffix} >= {counted}:", f"    size += {own.least}"]
+        lines += inner.lines(renamed(step.record.segments, suffix), last)
+        if last:
+            lines += [f"if {condition(last, '{}_raw')}:", "    break"]
+        number = str(step.length.maximum) if step.fixed or last else f"{step.name}_count"
+        index = f"index{suffix}" if counted else "_"
+        loop = [f"for {index} in range({number}):", *indented(lines)]
+        return [*loop, "else:", "    return -read"] if last else loop
+
+    def _decided(self, step: Step) -> Iterable[str]:
+        """The statements that read a step which decides later sizes."""
+        names = {each.name for each in holders((step,))} & self._tested
+        if (step.run, step.sized) in self._known if isinstance(step, CountStep) else not names:
+            return
+        assert isinstance(step, ValueStep | BitsStep | CountStep)
+        front = step.place.front.fixed
+
+        def at(more: int) -> str:
+            return f"start + {front + more}" if front + more else "start"
+
+        end = at(step.integer.size)
+        yield f"if len(data) < {end}:"
+        yield "    return size"
+        if self._bounded:
+            yield f"read = {end}"
+        number = integers.read(step.integer, "data", at)
+        if isinstance(step, ValueStep):
+            yield f"{step.name}_raw = {_number(step.integer, number)}"
+        elif isinstance(step, BitsStep):
+            yield f"{step.name}_whole = {number}"
+            for member in step.members:
+                if member.name in self._tested:
+                    taken = f"{step.name}_whole >> {member.shift} & 0x{(1 << member.bits) - 1:X}"
+                    signed = member.number.signed
+                    yield f"{member.name}_raw = " + (
+                        integers.sign_extended(f"({taken})", member.bits) if signed else taken
+                    )
+        else:
+            self._known.add((step.run, step.sized))
+            yield from self._count(step, number, f"    return -({end})")
+
+    def _count(self, step: CountStep, number: str, otherwise: str) -> Iterable[str]:
+        if step.sized:
+            yield from sized_lines(step, number, otherwise)
+            return
+        run = next(each for each in self._steps if isinstance(each, RunStep) and each.name == step.run)
+        yield from divided(run, integers.own_bytes(step.term, number), step.scale, otherwise)
+
+
+def sized_lines(step: CountStep, number: str, otherwise: str) -> list[str]:
+    """The statements that take the bytes of walked records from a count, and check them."""
+    more, size = step.term.more, f"{step.run}_bytes"
+    bounds = Within(step.bounds.low - more, step.bounds.high - more)
+    first = f"{size} = {integers.own_bytes(step.term, number)}"
+    return [first, f"if {integers.broken(bounds, size)}:", otherwise]
+
+
+def times(run: RunStep) -> str:
+    """The size of a run as an expression."""
+    count = f"{run.name}_count"
+    return f"{run.item_size} * {count}" if run.item_size > 1 else count
+
+
+def _number(integer: Integer, read: str) -> str:
+    """A number that was read: without unused bits, and with its sign."""
+    if integer.size == 1 and integer.bits < 8:
+        read = f"{read} & 0x{integer.mask:X}"
+    if integer.signed and (integer.size == 1 or integer.byteorder is None):
+        return integers.sign_extended(f"({read})", integer.bits)
+    return read
+
+
+def _without_last_start(lines: list[str]) -> list[str]:
+    while lines and lines[-1].lstrip().startswith("start += ") and not lines[-1].startswith(" "):
+        lines = lines[:-1]
+    return lines
