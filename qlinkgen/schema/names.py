@@ -116,6 +116,7 @@ class _Checker:
             self.spelling(kind, ("frames", kind))
             groups.append((("frames", kind, "parts"), spec.parts))
         for path, parts in groups:
+            owners: dict[str, str] = {}
             for name, part in parts.items():
                 self.spelling(name, (*path, name))
                 if part.told == "address":
@@ -127,6 +128,8 @@ class _Checker:
                         self._error(
                             "name-clash", place, f"{inner} is also a part of the frame", "rename one of them"
                         )
+                    elif (owner := owners.setdefault(inner, name)) != name:
+                        self._error("name-clash", place, f"{inner} is also in {owner}", "rename one of them")
                     if bits.role == "address":
                         address = inner
         return address

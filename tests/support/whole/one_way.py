@@ -19,6 +19,9 @@ def add(rng: random.Random, frame: Doc, *, plain: bool) -> None:
 
 def _add(rng: random.Random, frame: Doc, name: str, *, plain: bool) -> None:
     parts, spec = frame["parts"], _part(rng, frame["parts"], plain=plain)
+    if any("fault" in each.get("bits", {}) for each in parts.values()):
+        # The bits of two parts have different names.
+        spec = {"type": "u8", "range": "0..1"} if "bits" in spec else spec
     names = list(parts)
     at = _place(rng, frame, names, constant="value" in spec)
     spec["if"] = {"direction": rng.choice(("request", "response", "not request"))}
