@@ -15,7 +15,7 @@ from qlinkgen.schema.file_base import FileMapping
 from qlinkgen.schema.file_commands import CommandSpec, DefaultsSpec, MessageSpec, Replies
 from qlinkgen.schema.file_fields import EnumSpec, FlagsSpec, GroupSpec, TypeSpec
 from qlinkgen.schema.file_frames import FrameSpec, KindSpec
-from qlinkgen.schema.kinds import Count, Id, Label, Name, Order, Text, Time, WholeRange
+from qlinkgen.schema.kinds import Count, Id, Label, Name, NumberOrName, Order, Text, Time, WholeRange
 
 
 class ProtocolSpec(FileMapping):
@@ -87,7 +87,7 @@ class SchemaFile(FileMapping):
     replies: Replies = Field(
         default_factory=dict, description="Answers other than the response, of all answered commands"
     )
-    to_unknown: dict[str, dict[str, Label]] = Field(
+    to_unknown: dict[str, dict[str, NumberOrName]] = Field(
         default_factory=dict,
         description="Reply of a slave to a request with an unknown id, by its name; values of its fields",
     )

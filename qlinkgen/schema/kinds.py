@@ -180,6 +180,10 @@ Consts = Annotated[
     WithJsonSchema({"anyOf": [{"type": "integer"}, {"type": "array", "items": {"type": "integer"}}]}),
 ]
 Label = Annotated[int | bool | str, PlainValidator(_label), _json("A label", "string", "integer", "boolean")]
+#: A value that is an integer, or named by an enum.
+NumberOrName = Annotated[
+    int | bool | str, PlainValidator(_label), _json("A number, or a name of its enum", "string", "integer")
+]
 Name = Annotated[str, WithJsonSchema({"type": "string", "pattern": NAME_PATTERN})]
 Count = Annotated[StrictInt, Field(ge=1)]
 Id = Annotated[StrictInt, Field(ge=0)]

@@ -9,7 +9,7 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Command, Unknown
 from qlinkgen.model.types import Enum, Scalar
 from qlinkgen.schema.file_model import SchemaFile
-from qlinkgen.schema.kinds import Label
+from qlinkgen.schema.kinds import NumberOrName
 from qlinkgen.schema.notation import AnswerId, shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
@@ -90,7 +90,9 @@ class UnknownBuilder:
             self._error((*_PATH, name), what, "name a reply without an echo")
         return not message.echoes
 
-    def _raws(self, message: Message, values: Mapping[str, Label], path: Path) -> tuple[tuple[str, int], ...]:
+    def _raws(
+        self, message: Message, values: Mapping[str, NumberOrName], path: Path
+    ) -> tuple[tuple[str, int], ...]:
         """The raw numbers of the values that are stated; the others have their defaults."""
         known = {value.name: value for value in message.values}
         found = []
@@ -113,7 +115,7 @@ class UnknownBuilder:
         return tuple(found)
 
 
-def _raw(kind: Scalar, given: Label) -> int | None:
+def _raw(kind: Scalar, given: NumberOrName) -> int | None:
     """The raw number of a value as written, None if it has none."""
     if kind.scaling is not None or not (kind.meaning is None or isinstance(kind.meaning, Enum)):
         return None

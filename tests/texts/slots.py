@@ -23,7 +23,7 @@ from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.source import parse
 
 FOLDER = Path(__file__).parent
-SCHEMAS = ("delimited", "marked", "packet")
+SCHEMAS = ("delimited", "marked", "packet", "several")
 #: Mapping and key of a text, such as ("FieldSpec", "unit").
 Kind = tuple[str, str]
 
@@ -120,18 +120,24 @@ def _members(data: Mapping[str, Any], hint: Any) -> Iterator[tuple[str, Any]]:
 
 def _model_of(data: Mapping[str, Any], hint: Any) -> Any:
     """The class of a mapping; None for a table of names, which may be its short form."""
-    model = _first(hint, _is_model, through_dicts=False)
+    models = list(_all(hint, _is_model))
+    model = next((each for each in models if data.keys() <= each.model_fields.keys()), None)
+    model = model or next(iter(models), None)
     short = any(map(_is_table, _parts(hint))) and not _is_table(hint)
     return None if short and model is not None and not data.keys() <= model.model_fields.keys() else model
 
 
-def _first(hint: Any, wanted: Any, *, through_dicts: bool = True) -> Any:
+def _first(hint: Any, wanted: Any) -> Any:
+    return next(_all(hint, wanted, through_dicts=True), None)
+
+
+def _all(hint: Any, wanted: Any, *, through_dicts: bool = False) -> Iterator[Any]:
+    """The parts of an annotation that are wanted, without what is inside them."""
     if wanted(hint):
-        return hint
-    if _is_table(hint) and not through_dicts:
-        return None
-    inner = (_first(part, wanted, through_dicts=through_dicts) for part in typing.get_args(hint))
-    return next((part for part in inner if part is not None), None)
+        yield hint
+    elif through_dicts or not _is_table(hint):
+        for part in typing.get_args(hint):
+            yield from _all(part, wanted, through_dicts=through_dicts)
 
 
 @functools.cache
