@@ -172,7 +172,7 @@ def test_our_slave_answers_its_client(pty: PtyPort, slave: Registers, framing: s
         assert slave.values[11] == 0xABCD
         refused = client.read_holding_registers(99, count=2, device_id=NODE)
         assert (refused.isError(), refused.exception_code) == (True, 2)
-        unknown = client.read_fifo_queue(address=4, device_id=NODE)
+        unknown = client.read_device_information(device_id=NODE)
         assert (unknown.isError(), unknown.exception_code) == (True, 1)
         assert client.read_holding_registers(20, count=3, device_id=NODE).registers == [7, 8, 9]
     finally:

@@ -8,6 +8,7 @@ from typing import Any
 from pymodbus.framer import FramerBase, FramerRTU
 from pymodbus.pdu import DecodePDU, ModbusPDU
 from pymodbus.pdu import bit_message as bits
+from pymodbus.pdu import file_message as files
 from pymodbus.pdu import other_message as other
 from pymodbus.pdu import register_message as registers
 from pymodbus.pdu.diag_message import DiagnosticBase
@@ -93,6 +94,12 @@ _KINDS: Mapping[str, tuple[type[ModbusPDU], Mapping[str, str]]] = {
             """read_start=read_address read_quantity=read_count write_start=write_address
             registers=write_registers""",
             "registers=registers",
+        ),
+        (
+            "read_fifo_queue",
+            (files.ReadFifoQueueRequest, files.ReadFifoQueueResponse),
+            "pointer=address",
+            "registers=values",
         ),
     )
     for direction, kind, named in zip(("request", "response"), kinds, (requested, answered), strict=True)
