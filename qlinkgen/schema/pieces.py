@@ -28,7 +28,7 @@ class PieceBuilder:
     def __init__(self, report: Reporter, types: TypeBuilder) -> None:
         """``types`` are those of values."""
         self._report = report
-        self._types = types
+        self._types = types.in_bytes()
 
     def whole(self, name: str, spec: PartSpec, scalar: Scalar, path: Path) -> PartBits | None:
         """All bits of a part with one role; None for a role that needs no bits."""
@@ -50,6 +50,10 @@ class PieceBuilder:
         keys = spec.model_fields_set & FieldSpec.model_fields.keys() - {"when"}
         given = {key: getattr(spec, key) for key in keys}
         kind = self._types.build(FieldSpec.model_construct(_fields_set=set(given), **given), path)
+        whole = kind.container if isinstance(kind, Bits) else kind
+        if isinstance(whole, Scalar) and not whole.text and any(each.bits < 8 for each in whole.chunks):
+            what = f"{shown(spec.type)} is sent in groups of bits"
+            self._fault("bad-width", (*path, "type"), what, "use an integer of whole bytes for a part")
         match kind:
             case Bits():
                 found = [(each.name, each.shift, each.type, each.doc) for each in kind.members]

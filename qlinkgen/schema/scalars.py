@@ -82,6 +82,12 @@ class ScalarBuilder:
         #: Names of types in use.
         self.used: set[str] = set()
 
+    def in_bytes(self, file: SchemaFile) -> ScalarBuilder:
+        """The same for a file without groups."""
+        found = ScalarBuilder(file, self._enums, self._flags)
+        found.used = self.used
+        return found
+
     def named(self, base: str, location: Location, count: str | None = None) -> Plain | None:
         """The type with a name; an unknown one is reported. ``count`` is the text of its brackets."""
         self.used.add(base)

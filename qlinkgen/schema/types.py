@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 
 from qlinkgen.model.types import Array, Bits, Blob, Scalar
@@ -76,6 +77,14 @@ class TypeBuilder:
         if self.build(spec, path, (name,)) is None or len(self._report.faults) > before:
             self._report.taint(path)
         self._chain -= 1
+
+    def in_bytes(self) -> TypeBuilder:
+        """The same types for parts of a frame, which `groups` of the file does not apply to."""
+        if self._file.groups is None:
+            return self
+        found, file = copy(self), self._file.model_copy(update={"groups": None})
+        found._file, found._scalars = file, self._scalars.in_bytes(file)  # noqa: SLF001 - of the same class
+        return found
 
     def bits(self, spec: BitSpec, path: Path) -> Scalar | None:
         """The number in bits of an integer; None if its type is unknown."""

@@ -77,6 +77,16 @@ frame:
     crc: {type: u8, algorithm: sum8, over: [code, data]}
     end: {role: terminator, value: 00}
 """
+_SYSEX = """\
+groups: {bits: 7, first: most}
+bus: {kind: master_slave}
+frame:
+  parts:
+    code: {role: message, type: u8}
+    state: {type: u8, range: 0..1}
+    data: {role: payload, size: 0..40}
+    end: {role: terminator, value: 80}
+"""
 _BUS = "bus: {kind: master_slave, nodes: 1..8, broadcast: 9}\n"
 
 FOUND = {
@@ -115,6 +125,8 @@ FOUND = {
     "a coded frame, whose state C++ did not see wholly initialised": _ENDED
     + "  coding: [{cobs: 00}]\n"
     + "messages:\n  log: {id: 5, fields: {v: u8}}\n",
+    "a value of every frame beside groups of bits, which Python could not decode": _SYSEX
+    + "messages:\n  log: {id: 5, fields: {v: u14}}\n",
     "a field called like the type of another, which C++ refuses": _PARTS
     + _BUS
     + "messages:\n  log: {id: 5, fields: {v: u8, uint8_t: u8, int64_t: i64}}\n",

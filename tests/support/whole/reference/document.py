@@ -582,6 +582,10 @@ class Fields:
 
     def beside(self, name: str, given: Any) -> tuple[Slot, tuple[tuple[str, int, Number], ...]]:
         """A part of a frame with values: its integer, and the name, lowest bit and number of each."""
+        if "groups" in self._document:
+            # Groups of the file are those of fields.
+            document = {key: each for key, each in self._document.items() if key != "groups"}
+            return Fields(document, self.most).beside(name, given)
         spec = part_doc(given)
         if "bits" in spec:
             members = tuple(
