@@ -32,7 +32,7 @@ class Asked:
 def asked(document: Doc, fields: Fields, messages: Sequence[Message]) -> Asked | None:
     """The answers with the number that the defaults state, or in a frame without numbers."""
     free = set(document.get("messages", {}))
-    free |= {name for name, spec in document["commands"].items() if "steps" in spec}
+    free |= {name for name, spec in document.get("commands", {}).items() if "steps" in spec}
     answers = [m for m in messages if m.direction == "response" and m.name.partition(".")[0] not in free]
     parts = document["frame"].get("parts", {})
     if not parts:
@@ -43,7 +43,7 @@ def asked(document: Doc, fields: Fields, messages: Sequence[Message]) -> Asked |
         return None
     by_request = {
         f"{name}.request": [each for each in found if each.name in _names(document, name)]
-        for name in document["commands"]
+        for name in document.get("commands", {})
     }
     ordered = {
         request: sorted(each, key=lambda answer: not answer.name.endswith(".response"))
@@ -67,12 +67,12 @@ def _states(document: Doc, answer: Message) -> bool:
     if not isinstance(common, dict) or "id" not in common or str(common["id"]).startswith("request"):
         return False
     name, _, part = answer.name.partition(".")
-    own = document["commands"].get(name, {}).get("response")
+    own = document.get("commands", {}).get(name, {}).get("response")
     return part == "response" and "id" not in long_form({} if own is None else own)
 
 
 def _names(document: Doc, command: str) -> set[str]:
     """The names that the answers to a command may have."""
-    own = document["commands"][command].get("replies", {})
+    own = document.get("commands", {})[command].get("replies", {})
     common = [name for name in document.get("replies", {}) if name not in own]
     return {f"{command}.response", *common, *(f"{command}.{name}" for name in (*common, *own))}
