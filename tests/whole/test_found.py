@@ -127,6 +127,10 @@ FOUND = {
     + "messages:\n  log: {id: 5, fields: {v: u8}}\n",
     "a value of every frame beside groups of bits, which Python could not decode": _SYSEX
     + "messages:\n  log: {id: 5, fields: {v: u14}}\n",
+    "records that a choice has, which Python took from an attribute of the case": _PARTS
+    + _BUS
+    + "types: {point: {fields: {x: bool}}}\n"
+    + 'messages:\n  log: {id: 5, fields: {k: u8, v: {switch: k, cases: {0: "point[4]"}, default: u8}}}\n',
     "a field called like the type of another, which C++ refuses": _PARTS
     + _BUS
     + "messages:\n  log: {id: 5, fields: {v: u8, uint8_t: u8, int64_t: i64}}\n",

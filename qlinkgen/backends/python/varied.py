@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from qlinkgen.backends.python import integers
 from qlinkgen.backends.python.layout import bare, indented, wrapped
-from qlinkgen.backends.python.names import attribute
+from qlinkgen.backends.python.names import attribute, held, source_of
 from qlinkgen.backends.python.place import Place
 from qlinkgen.model.condition import Test
 from qlinkgen.plan.expr import OneOf, Within
@@ -45,7 +45,7 @@ def is_sized(payload: PayloadPlan, name: str) -> bool:
 
 def octets_of(step: RecordStep | RecordsStep, place: Place) -> str:
     """The expression for the bytes of records."""
-    name, source = place.classes[step.record.name], f"self.{attribute(step.name)}"
+    name, source = place.classes[step.record.name], source_of(step)
     if isinstance(step, RecordStep):
         return f"{name}.to_bytes({source})"
     return f'b"".join([{name}.to_bytes(each) for each in {source}])'
@@ -55,7 +55,7 @@ def read_lines(segment: Segment, payload: PayloadPlan, place: Place, offset: str
     """The statements that read walked records at the local ``at``; ``offset`` is that in the payload."""
     step, wrong = segment.records, f"    raise {place.use('LayoutError')}"
     assert step is not None
-    name, kind = attribute(step.name), place.classes[step.record.name]
+    name, kind = held(step), place.classes[step.record.name]
     exact = isinstance(step, RecordsStep) and (segment.rest is not None or is_sized(payload, step.name))
     limit = f"{step.name}_end" if exact else "end"
     lines: list[str] = []
