@@ -146,7 +146,8 @@ class LengthView:
     """The length of a frame: bounds, offsets, its value in ``head`` and the bytes of ``number``.
 
     Attributes:
-        quick: the same value; raises an IndexError if the header is too short.
+        quick: the same value; raises an IndexError if the header is too short, unless ``sliced``.
+        sliced: if the header is too short, ``quick`` is a wrong number.
         bounded: its part holds numbers beyond the bounds.
     """
 
@@ -157,6 +158,7 @@ class LengthView:
     end: int
     value: str
     quick: str
+    sliced: bool
     bytes: str
     scale: int
     bounded: bool
@@ -790,6 +792,7 @@ def _length_view(plan: Plan, envelope: Envelope) -> LengthView | None:
         end=start + part.size,
         value=pieces.read(envelope, part, "head") + (f" * {part.scale}" if part.scale > 1 else ""),
         quick=_quick_length(part, start),
+        sliced=integers.is_sliced(part.integer),
         bytes=integers.to_bytes(part.integer, "number"),
         scale=part.scale,
         bounded=(part.least, part.most) != (0, part.integer.mask),

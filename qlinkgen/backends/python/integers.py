@@ -125,9 +125,19 @@ def read(integer: Integer, data: str, at: Callable[[int], str]) -> str:
 
 def read_bytewise(integer: Integer, data: str, start: int) -> str:
     """The same for two or three bytes, which is faster; an IndexError if there are too few."""
-    if integer.size not in {2, 3} or integer.signed or integer.bcd or integer.byteorder is None:
+    if not _joins(integer) or integer.byteorder is None:
         return read(integer, data, lambda more: str(start + more))
     return joined(data, range(start, start + integer.size), integer.byteorder)
+
+
+def is_sliced(integer: Integer) -> bool:
+    """Whether `read_bytewise` takes a slice, so that too few bytes result in a wrong number."""
+    return not (integer.size == 1 or integer.byteorder is None or _joins(integer))
+
+
+def _joins(integer: Integer) -> bool:
+    """Whether the bytes of an integer that is not in groups are read one by one."""
+    return integer.size in {2, 3} and not (integer.signed or integer.bcd)
 
 
 def joined(data: str, places: range, byteorder: str) -> str:
