@@ -43,6 +43,7 @@ class KitView:
 
     Attributes:
         place_type: holds the offsets of struct members; 16 bits if possible, for small targets.
+        unaddressed: responses in frames without address, where others have one.
         has_records: the struct of a message has records, or choices.
         has_choices: a message has a value whose type another value decides.
         empty_wires: a response is empty: without payload, frame and check value.
@@ -65,6 +66,7 @@ class KitView:
     rescans: bool
     packets: bool
     broadcast: bool
+    unaddressed: list[str]
     size_bytes: int
     place_type: str
     has_records: bool
@@ -140,6 +142,7 @@ class Kit:
             rescans=isinstance(self._plan.frame.receiver, Rescan),
             packets=self._plan.frame.needs_request,
             broadcast=bool(header.address) and self._plan.protocol.bus.broadcast is not None,
+            unaddressed=self._unaddressed(),
             size_bytes=self._entries.size_bytes,
             # A number in a struct is followed by up to seven bytes of padding.
             place_type=_unsigned(8 * values if records else values + 8 * members),
@@ -183,6 +186,13 @@ class Kit:
                 f"{self._plan.protocol.name}: {len(kinds)} kinds of vectors; a kit holds at most {_KINDS}"
             )
         return kinds
+
+    def _unaddressed(self) -> list[str]:
+        responses = [each for each in self._plan.messages if each.direction == "response"]
+        if not self._header.address or not self._plan.frame.kinds:
+            return []
+        found = {each.id: each.message for each in responses if not each.envelope.address}
+        return [self._header.constant(each) for each in found.values()]
 
     def _check(self) -> CheckView | None:
         """The check value of the nine characters 123456789, None if it is not a CRC."""
