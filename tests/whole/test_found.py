@@ -87,6 +87,19 @@ frame:
     data: {role: payload, size: 0..40}
     end: {role: terminator, value: 80}
 """
+_ESCAPED = "  coding: {escape: 7D, xor: 20, of: [7E, 7D]}\n"
+_KINDS = """\
+frames:
+  long:
+    parts:
+      start: A5
+      node: {role: address, type: u8}
+      code: {role: message, type: u8}
+      length: {type: u8, counts: [data]}
+      data: {role: payload, size: 0..9}
+      crc: {type: u8, algorithm: sum8, over: [code, data]}
+  short: {parts: {start: 24 58}}
+"""
 _BUS = "bus: {kind: master_slave, nodes: 1..8, broadcast: 9}\n"
 
 FOUND = {
@@ -131,6 +144,20 @@ FOUND = {
     + _BUS
     + "types: {point: {fields: {x: bool}}}\n"
     + 'messages:\n  log: {id: 5, fields: {k: u8, v: {switch: k, cases: {0: "point[4]"}, default: u8}}}\n',
+    "a length of four bytes, which Python took from fewer to wait for its frame": _PARTS.replace(
+        "length, type: u8", "length, type: u32"
+    )
+    + _BUS
+    + "messages:\n  log: {id: 5, fields: {v: u8}}\n",
+    "a wrong number before a terminator, a fault of a frame that the reference did not tell": _ENDED.replace(
+        "parts:", "parts:\n    start: {value: 7E}\n    kind: {type: u8, const: [1, 2]}"
+    ).replace("value: 00", "value: 7E")
+    + _ESCAPED
+    + "messages:\n  log: {id: 5, fields: {v: u8}}\n",
+    "a response without address, for which the kit asked everybody": _KINDS
+    + "bus: {kind: host, nodes: 1..8, broadcast: 0}\n"
+    "commands:\n  ask: {id: 5, addressing: node, request: {v: u8}, response: sent, repeat: safe}\n"
+    "messages:\n  sent: {direction: response, fields: {}, frame: short}\n",
     "a field called like the type of another, which C++ refuses": _PARTS
     + _BUS
     + "messages:\n  log: {id: 5, fields: {v: u8, uint8_t: u8, int64_t: i64}}\n",

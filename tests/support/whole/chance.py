@@ -82,9 +82,10 @@ def _of_slots(
 
 def _between(raw: Raw, barred: bytes) -> Raw:
     """A text without the bytes that it does not have."""
-    return (
-        bytes(0x7E if each in barred else each for each in raw) if barred and isinstance(raw, bytes) else raw
-    )
+    if not barred or not isinstance(raw, bytes):
+        return raw
+    other = next(each for each in b"~0x_" if each not in barred)
+    return bytes(other if each in barred else each for each in raw)
 
 
 def _shorter(kind: Value, short: bool, shortest: bool) -> Value:

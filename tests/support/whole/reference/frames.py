@@ -658,7 +658,7 @@ class Splitter:
             if not frame.least <= announced <= frame.most_sent:
                 raise Refused("length", cursor.at)
         if part.role in ("bits", "derived") and frame.wrong(part, cut):
-            raise Refused("frame", cursor.at, told=False)
+            raise Refused("frame", cursor.at, told=frame.terminator is not None)
         if frame.bare and any(role not in ("constant", "value") for role, *_ in part.bits):
             number, address = frame.number("message", cut), frame.number("address", cut)
             if number is None:
