@@ -87,8 +87,8 @@ def test_every_key_of_type_bytes_is_listed() -> None:
         for name, info in each.model_fields.items()
         if info.annotation is bytes or "Annotated[bytes" in str(info.annotation)
     }
-    # Those of an example have to be a whole frame: see test_examples.
-    assert (keys | {"default"}) - {"wire"} == set(READ)
+    # Those of an example have to be a whole frame: see test_examples. A separator is a character.
+    assert (keys | {"default"}) - {"wire", "separator", "terminator"} == set(READ)
 
 
 def loaded(tmp_path: Path, key: str, text: str) -> Protocol:
@@ -133,6 +133,19 @@ def test_pairs(tmp_path: Path, key: str, text: str) -> None:
 def test_invalid_byte_strings(tmp_path: Path, key: str, text: str) -> None:
     with pytest.raises(SchemaError, match="is not a byte string; write one number like 0xA5, or hex pairs"):
         loaded(tmp_path, key, text)
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"), [("00", "00"), ("10", "10"), ("13", "13"), ("0x0A", "0a"), ("'7C'", "7c")]
+)
+def test_a_terminator_is_a_character_by_its_hex_pair(tmp_path: Path, text: str, meant: str) -> None:
+    path = tmp_path / "sample.yaml"
+    plain = SCHEMA.format(**USUAL).replace('"bytes[1..4]", default: "00"', '"bytes[1]"')
+    plain = plain.replace('"bytes[4]", pad: 00', f'"text[0..4]", terminator: {text}')
+    path.write_text(plain, encoding="utf-8")
+    kind = load(path).message("go.request").fields[1].type
+    assert isinstance(kind, Blob)
+    assert kind.terminator.hex() == meant
 
 
 def test_numbers_elsewhere_are_as_they_were(tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ def rules(text: str) -> list[str]:
         ('words: "u16[0..8]"', 'words: "u17x[0..8]"', "unknown-type"),
         ("counts: words}", "count: words}", "unknown-key"),
         ("counts: words}", "counts: wrods}", "bad-count"),
-        ("counts: words}", "counts: [words]}", "wrong-type"),
+        ("counts: words}", "counts: {words: 1}}", "wrong-type"),
         (
             "request: {counter: {type: u8, default: 9}",
             "request: {counter: {type: u8, default: 900}",

@@ -256,7 +256,7 @@ def test_each_of_several_constants_is_accepted(wire: str, kind: str) -> None:
         ("way: {role: direction, type: u8}", "way has no values"),
         (
             "way: {role: direction, type: u8, values: {request: 1, response: 1}}",
-            "way is the same in both directions",
+            "way has one value twice",
         ),
         ("way: {role: direction, type: u8, values: {request: 1, response: 256}}", "256 does not fit 8 bits"),
         ("more: {type: u8, equals: missing}", "unknown part 'missing'"),
