@@ -83,7 +83,7 @@ def test_budget_and_page(require_tool: Tool, missing_tool: Missing) -> None:
         0.7 * slave.main < seen <= slave.main + slave.interrupt
     )  # the interrupt seldom hits the deepest place
     standing, new = written(PAGE.read_text("utf-8")), tables(measured)
-    assert standing.keys() == {*new, "peers"}
+    assert standing.keys() == {*new, "peers", "library"}
     if standing["tools"] != new["tools"]:
         pytest.skip(
             f"docs/firmware.md is of other compilers than {new['tools']} Its figures are not compared"

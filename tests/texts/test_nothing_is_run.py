@@ -21,11 +21,13 @@ FRAMES = {
     "delimited": "a5a50e0103010000000700000000000000000000400c",
     "marked": "9205007a6290",
     "packet": "10000a",
+    "several": "10010304",
 }
 MESSAGES = {
     "delimited": ("measure", "--node", "3", "speed=7"),
     "marked": ("set", "--address", "2", "value=5"),
     "packet": ("set_speed", "speed=9"),
+    "several": ("look", "--node", "3"),
 }
 
 

@@ -20,7 +20,7 @@ from tests.texts.samples import ORDINARY, TEXTS
 from tests.texts.slots import SCHEMAS, protocol_of, put, slots, text_of
 
 EVIL = "\x1b]0;owned\x07\x1b[31m\u202e\x9b2J\x00\x7f"
-FRAMES = {"delimited": "a5a5010100", "marked": "89a5", "packet": "10000a"}
+FRAMES = {"delimited": "a5a5010100", "marked": "89a5", "packet": "10000a", "several": "10010304"}
 Run = Callable[..., str]
 
 
