@@ -66,6 +66,7 @@ class CommandBuilder:
         self._replies = ReplyBuilder(file, report, messages, frame)
         self._sizes: dict[str, tuple[tuple[str, str], ...]] = {}
         self._singles: dict[str, Message] = {}
+        self._replied: set[str] = set()
         self._steps = StepBuilder(file, report, messages, self._singles, self._sizes)
         #: Names of the answers that only their request tells apart, and of the message that carries them.
         self._asked: frozenset[str] = frozenset()
@@ -141,8 +142,8 @@ class CommandBuilder:
         self, name: str, response: Message | None, addressing: Addressing
     ) -> tuple[Reply, ...]:
         found = tuple(self._replies.of(name, addressing, answered=response is not None))
-        known = {message.name for message in self.messages}
-        self.messages += [each.message for each in found if each.message.name not in known]
+        self.messages += [each.message for each in found if each.message.name not in self._replied]
+        self._replied |= {each.message.name for each in found}
         return found
 
     def _many(
