@@ -139,12 +139,16 @@ class Separated(Message):
         self.separator = separator
         self.optional = {field for field, _ in optional}
         self.defaults.update({field: None for field, given in optional if not given})
-        needed = [i for i, each in enumerate(fields, 1) if each.name not in self.optional]
+        needed = [
+            i for i, each in enumerate(fields, 1) if each.name not in self.optional
+        ]
         self.needed = max(needed, default=1)
         sizes = [_sizes(each) for each in fields]
         kept = sizes[: self.needed]
         absent = [each.name in self.optional for each in fields]
-        least = sum(0 if none else low for none, (low, _) in zip(absent, kept, strict=False))
+        least = sum(
+            0 if none else low for none, (low, _) in zip(absent, kept, strict=False)
+        )
         self.least = least + self.needed - 1
         self.most = sum(high for _, high in sizes) + len(sizes) - 1
 

@@ -56,12 +56,16 @@ class Kinds(Frame):
     def __init__(self, *kinds: Kind) -> None:
         Construct.__init__(self)
         self.kinds = kinds
-        self.by_name = {name: message for kind in kinds for name, message in kind.by_name.items()}
+        self.by_name = {
+            name: message for kind in kinds for name, message in kind.by_name.items()
+        }
 
     def kind_of(self, message: Message, size: int) -> Kind:
         """The kind of frame for a payload of a size, or else the longest that carries the message."""
         carrying = [kind for kind in self.kinds if message.name in kind.by_name]
-        return next((kind for kind in carrying if kind.holds(message, size)), carrying[-1])
+        return next(
+            (kind for kind in carrying if kind.holds(message, size)), carrying[-1]
+        )
 
     def wrap(
         self,
@@ -77,17 +81,23 @@ class Kinds(Frame):
         kind = self.kind_of(message, len(payload))
         return kind.wrap(message, payload, address, request, number, beside=beside)
 
-    def _build(self, obj: Values, stream: BinaryIO, context: Container, path: str) -> Values:
+    def _build(
+        self, obj: Values, stream: BinaryIO, context: Container, path: str
+    ) -> Values:
         message = self.by_name.get(obj["message"])
         if message is None:
-            raise ValidationError(f"unknown message {obj['message']!r} in this direction", path=path)
+            raise ValidationError(
+                f"unknown message {obj['message']!r} in this direction", path=path
+            )
         payload = message.build(obj.get("fields") or {})
         kind = self.kind_of(message, len(payload))
-        return kind._build(obj, stream, context, path)  # noqa: SLF001  # its kind
+        return kind._build(obj, stream, context, path)  # its kind
 
     def _frame(self, wire: bytes, request: bytes) -> Container:
         for kind in self.kinds:
             first = kind.parts[0]
-            if isinstance(first, Constant) and first.data.startswith(wire[: len(first.data)]):
-                return kind._frame(wire, request)  # noqa: SLF001
+            if isinstance(first, Constant) and first.data.startswith(
+                wire[: len(first.data)]
+            ):
+                return kind._frame(wire, request)
         raise FrameError("frame", f"no kind of frame begins with {wire[:1].hex()}")
