@@ -36,7 +36,11 @@ def read_decimal(text: bytes, point: int, low: int, high: int) -> int:
 
 def read_hexadecimal(text: bytes, high: int) -> int:
     """The number of hexadecimal digits of either case; high + 1 if it is not one up to high."""
-    number = int(text, 16) if text.isalnum() and not text.upper().strip(b"0123456789ABCDEF") else high + 1
+    number = (
+        int(text, 16)
+        if text.isalnum() and not text.upper().strip(b"0123456789ABCDEF")
+        else high + 1
+    )
     return min(number, high + 1)
 
 
