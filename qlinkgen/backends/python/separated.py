@@ -29,14 +29,10 @@ class SeparatedEncoder(WalkedEncoder):
             lines += self._text(step)
         texts = [f"{step.name}_text" for step in payload.steps]
         separator, least = literal(payload.separator), needed(payload)
-        if least == len(texts):
-            joined = (
-                wrapped(f"data = {separator}.join((", texts, "))", 8)
-                if len(texts) > 1
-                else [f"data = {texts[0]}"]
-            )
-            return [*lines, *joined, *self._framed(name)]
+        if len(texts) == 1 == least:
+            return [*lines, f"data = {texts[0]}", *self._framed(name)]
         cut = [f"while len(texts) > {least} and not texts[-1]:", "    texts.pop()"]
+        cut = cut if least < len(texts) else []
         return [
             *lines,
             *wrapped("texts = [", texts, "]", 8),
