@@ -110,6 +110,8 @@ LONG = "a_rather_long_name"
         f"{LONG} = (({LONG} >> 11 & 0x1FFFFFFFFF) ^ 0x1000000000) - 0x1000000000 + {LONG}",
         f'def {LONG}(one: int, two: int, three: int, four: int = 0) -> tuple[int, str]:\n    """"""',
         f"return {LONG}[{LONG}]({', '.join([LONG] * 5)})",
+        f"answer: {'A' * 40} | {'B' * 40} = self.ask_any(request, {'A' * 40}, {'B' * 40})",
+        f"answer: {'A' * 30} | {'B' * 30} = await self.ask_any(request, A, B)",
     ],
 )
 def test_statements_are_split_as_ruff_splits_them(statement: str, tmp_path: Path) -> None:

@@ -298,7 +298,7 @@ class BusModule:
         if call.response is None:
             return [*request, f"{wait}self.tell(_request)"]
         ask = [self._ask(call, wait)]
-        if call.answers:  # a tuple, whose classes `ask_steps` cannot express
+        if call.done or call.answers:  # of any class, which `ask` cannot express
             answer = self._answer(call, call.done, surely=True)
             ask = [f"_answer: {answer} = {ask[0].removeprefix('return ')}", "return _answer"]
         if call.command.addressing != "either" or node:

@@ -161,10 +161,13 @@ def _split(nodes: list[Node], indent: int) -> list[str]:
         if long or indent + len(_flat(nodes[: places[0]])) < WIDTH:
             return _bracketed(nodes, indent, "", start)
     margin = " " * indent
+    rest = [Word(")", blank=False), *nodes[start - 1 :]]
     if any(_is(each, ",") for each in head):
-        rest = [Word(")", blank=False), *nodes[start - 1 :]]
         return [f"{margin}(", *_inside(head[:-1], indent + 4, joined=False), *_split(rest, indent)]
     opening = f"{margin}{_flat([*head, Word('(', blank=True)])}"
+    if any(_is(each, "|") for each in head) and (_is(body[0], "await") or len(opening) > WIDTH):
+        first = f"{margin}{_flat(head[:2])} ("  # the alternatives of an annotation
+        return [first, *_inside(head[2:-1], indent + 4), *_split(rest, indent)]
     if len(opening) > WIDTH:
         return _bracketed(nodes, indent, "")
     return [opening, *_inside(body, indent + 4), f"{margin}){_flat(tail)}"]
