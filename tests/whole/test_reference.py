@@ -69,7 +69,6 @@ def test_few_schemas_are_refused_and_every_shape_occurs() -> None:
         refused.update({each.rule for each in faults if each.severity == "error"} if protocol is None else ())
         made = Reference(text)
         shapes.update(traits(made).split())
-    # Its pieces meet at random, and lint refuses some of them together.
-    assert refused.total() < MANY // 5, refused
+    assert refused.total() < MANY // 10, refused
     wanted = "hunt search lead bare length counts unchecked end stuffed payload marked packets".split()  # noqa: SIM905
     assert {word for word in wanted if not shapes[word]} == set()

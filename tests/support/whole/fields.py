@@ -208,7 +208,7 @@ class FieldMaker:
             for unit in rng.choice((("items",), ("bytes",), ("bytes",), ("items", "bytes"))):
                 number = most * (record.size if unit == "bytes" else 1)
                 self._count(name, unit, number, made, len(made), taken=taken, room=room)
-            made.append((name, {"type": f"{kind}[{rng.choice((0, 0, 1, most - 1))}..{most}]"}))
+            made.append((name, {"type": f"{kind}[{rng.choice((0, 0, min(1, most - 1), most - 1))}..{most}]"}))
         room.left -= size * most
 
     def forget_unused(self, document: Doc) -> None:

@@ -439,6 +439,10 @@ class _Parts:
         if hunted:
             self.parts[names["length"]]["type"] = "u8"
 
+    def _counts_payload(self, names: Doc) -> bool:
+        """Whether a length tells the end of the payload before the checksum is known."""
+        return any(names["payload"] in spec.get("counts", ()) for spec in self.parts.values())
+
     def _stuffing(self, names: Doc, lead: str, *, hunted: bool, strict: bool) -> Doc:
         rng = self.rng
         if "trim" in self.parts[names["payload"]]:
@@ -452,7 +456,7 @@ class _Parts:
             after = rng.choice((" ".join(first[:2]), " ".join(first[:1]), " ".join(first[:3]))) or "10"
         insert = rng.choice(("00", "00", "FD", "10", after.split()[-1]))
         spec: Doc = {"after": after, "insert": "00" if hunted else insert}
-        if not hunted and self._chance(0.4):
+        if not hunted and "checksum" in names and self._counts_payload(names) and self._chance(0.4):
             return spec | {"checksum": "after"}
         if strict:
             return spec | {"exempt": [names["lead"]]}

@@ -152,7 +152,7 @@ class _Maker:
         fit = [each for each in found["commands"].values() if self._may_have_steps(each)]
         asking = [each for each in several.families if each.shape.address_bits or not several.addressed]
         asking = [each for each in asking if each.name and each.shape.id_bits]
-        if not fit or isinstance(fit[0]["response"], str):
+        if not fit or isinstance(fit[0]["response"], str) or "separator" in fit[0]:
             return
         steps: list[Doc] = []
         for key in rng.choices(("send", "receive"), k=rng.randint(1, 3)):
