@@ -24,11 +24,22 @@ class ConstantPart:
 
 
 @dataclass(frozen=True, slots=True)
-class LengthPart:
-    """The number of payload bytes as sent, plus ``bias``, in steps of ``scale``; ``least`` to ``most``."""
+class _IntegerPart:
+    """An integer with one role or several."""
 
     name: str
     integer: Integer
+
+    @property
+    def size(self) -> int:
+        """Bytes before stuffing."""
+        return self.integer.size
+
+
+@dataclass(frozen=True, slots=True)
+class LengthPart(_IntegerPart):
+    """The number of payload bytes as sent, plus ``bias``, in steps of ``scale``; ``least`` to ``most``."""
+
     bias: int
     least: int
     most: int
@@ -42,36 +53,15 @@ class LengthPart:
         """The size of the payload for a length."""
         return number * self.scale - self.bias
 
-    @property
-    def size(self) -> int:
-        """Bytes before stuffing."""
-        return self.integer.size
-
 
 @dataclass(frozen=True, slots=True)
-class IdPart:
+class IdPart(_IntegerPart):
     """The number of the message."""
 
-    name: str
-    integer: Integer
-
-    @property
-    def size(self) -> int:
-        """Bytes before stuffing."""
-        return self.integer.size
-
 
 @dataclass(frozen=True, slots=True)
-class AddressPart:
+class AddressPart(_IntegerPart):
     """The address of the node: the recipient of a request, the sender of a response."""
-
-    name: str
-    integer: Integer
-
-    @property
-    def size(self) -> int:
-        """Bytes before stuffing."""
-        return self.integer.size
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,17 +210,10 @@ Slot = IdSlot | AddressSlot | ConstantSlot | Member
 
 
 @dataclass(frozen=True, slots=True)
-class CellPart:
+class CellPart(_IntegerPart):
     """An integer whose bits have several roles; bits without one are sent as 0 and ignored when received."""
 
-    name: str
-    integer: Integer
     slots: tuple[Slot, ...]
-
-    @property
-    def size(self) -> int:
-        """Bytes before stuffing."""
-        return self.integer.size
 
     @property
     def constants(self) -> tuple[ConstantSlot, ...]:
