@@ -10,7 +10,7 @@ from qlinkgen.backends import python_text
 from qlinkgen.backends.python import docstrings, values
 from qlinkgen.backends.python.decode import Decoder
 from qlinkgen.backends.python.encode import Encoder
-from qlinkgen.backends.python.frames import seed_name
+from qlinkgen.backends.python.frame_checks import seed_name
 from qlinkgen.backends.python.layout import WIDTH, calls, in_hex, indented, listing, literal, wrapped
 from qlinkgen.backends.python.measure import measure_lines
 from qlinkgen.backends.python.names import attribute, class_name, constant_name, held, natural

@@ -1,23 +1,35 @@
-"""Views of frames for the templates: names, numbers and expressions, one for each kind of receiver."""
+"""Makes the views of frames from their plans."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.backends.python import integers, pieces
-from qlinkgen.backends.python.coding import CodingView, coding_view
-from qlinkgen.backends.python.layout import in_hex, literal, slice_of, wrapped
-from qlinkgen.backends.python.names import attribute, class_name
-from qlinkgen.backends.python.ways import Ways
-from qlinkgen.model.checksum import Algorithm, Checksum, Fletcher, Sum, Xor, catalogue
+from qlinkgen.backends.python.coding import coding_view
+from qlinkgen.backends.python.frame_checks import all_placed, check_bytes, check_view, seed_name
+from qlinkgen.backends.python.frame_directions import by_id
+from qlinkgen.backends.python.frame_views import (
+    AddressView,
+    BlocksView,
+    EndedView,
+    FrameView,
+    HeadCheck,
+    LengthView,
+    MarkedView,
+    PacketView,
+    PartsView,
+    StuffingView,
+    UniqueView,
+)
+from qlinkgen.backends.python.layout import in_hex, literal, slice_of
+from qlinkgen.backends.python.names import attribute
+from qlinkgen.model.checksum import Sum
 from qlinkgen.model.frame import Silence
 from qlinkgen.model.integer import ByteOrder
-from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import address_argument, address_attribute
 from qlinkgen.plan.check import Check
-from qlinkgen.plan.ends import ByLength, ByMark, ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import ByLength, ByMark, ByTerminator, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import (
     AddressPart,
@@ -31,337 +43,9 @@ from qlinkgen.plan.parts import (
     MarkPart,
     Part,
     PayloadPart,
-    Seed,
 )
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
-from qlinkgen.plan.tree import MessagePlan, Plan
-
-
-@dataclass(frozen=True)
-class DecodedDirection:
-    """A decoded direction: its function, its word in texts, and the names of its tables.
-
-    ``asking`` is the parameter of the function for the request, "" if no answer needs it.
-    """
-
-    direction: Direction
-    function: str
-    words: str
-    classes: str
-    readers: str
-    asking: str
-    by_id: str
-    readers_by_id: str
-    #: The function that decodes one frame, and what the decoder of a stream uses.
-    decode: str = "_decode"
-    ways: Sequence[str] = ()
-
-
-@dataclass(frozen=True)
-class CheckView:
-    """The check value of a frame.
-
-    Attributes:
-        definition: statement that defines the algorithm.
-        size: size on the wire.
-        order: byte order of a value that is sent whole, "" if bits are omitted.
-        bytes: expression for the bytes of the number ``crc``.
-        selectable: another algorithm of the catalogue can replace it.
-        maker: function of the support module that the definition calls.
-    """
-
-    definition: list[str]
-    size: int
-    order: str
-    bytes: str
-    selectable: bool
-    maker: str
-
-
-@dataclass(frozen=True)
-class AddressView:
-    """The address of a frame.
-
-    Attributes:
-        name: attribute of the messages.
-        parameter: name of the parameter of ``from_bytes``.
-        bytes: expression for the bytes of the part with ``number``, "" if the address shares a marked byte.
-        default: the default address.
-        limit: the greatest address, "" if the bytes hold no greater one.
-    """
-
-    name: str
-    parameter: str
-    bytes: str
-    default: int
-    limit: str = ""
-
-
-@dataclass(frozen=True)
-class UniqueView:
-    """A frame with a preamble that occurs nowhere else."""
-
-    title: str
-    idle: tuple[float, float] | None
-    check: CheckView
-    address: AddressView | None
-    preamble: str
-    mark: str
-    insert: str
-    header: int
-    overhead: int
-    length_end: int
-    uncounted: int
-    min_length: int
-    max_length: int
-    body_start: int
-    payload_of_body: str
-    id_at: int
-    blank_header: str
-    trailer: int
-    whole_sizes: Sequence[int]
-    prefix: str
-    check_letter: str
-
-    template = "unique"
-
-
-@dataclass(frozen=True)
-class HeadCheck:
-    """A condition for bytes that do not begin a frame, in wire order, and the result of ``_split``.
-
-    Attributes:
-        fault: "number", "address" or "constant" if only a decoder of one whole frame reports it.
-        whole: the condition for a whole header, "" if decoding its message finds the same.
-    """
-
-    test: str
-    found: str
-    fault: str = ""
-    whole: str = ""
-
-
-@dataclass(frozen=True)
-class LengthView:
-    """The length of a frame: bounds, offsets, its value in ``head`` and the bytes of ``number``.
-
-    Attributes:
-        quick: the same value; raises an IndexError if the header is too short, unless ``sliced``.
-        sliced: if the header is too short, ``quick`` is a wrong number.
-        bounded: its part holds numbers beyond the bounds.
-    """
-
-    bias: int
-    least: int
-    most: int
-    start: int
-    end: int
-    value: str
-    quick: str
-    sliced: bool
-    bytes: str
-    scale: int
-    bounded: bool
-
-
-@dataclass(frozen=True)
-class StuffingView:
-    """Stuffing of ``whole`` frames except their first and last bytes, or of payloads only."""
-
-    whole: bool
-    after: str
-    insert: str
-    front: int
-    back: int
-
-
-@dataclass(frozen=True)
-class EndedView:
-    """A terminator, and the coding of the bytes before it.
-
-    Attributes:
-        last: its last byte.
-        pair: its first byte if that also begins pairs of coded bytes, otherwise "".
-        kept: number of its bytes that may begin the next frame.
-        closing: size of the terminator and what follows it.
-        after: size of what follows it.
-        limit: maximum size of a frame up to its terminator.
-        lead: size of the constant at the beginning.
-        front: number of uncoded bytes at the beginning.
-        back: number of uncoded bytes at the end.
-        splits: uncoded bytes are not only the first constant and the terminator.
-        least: minimum size of a payload.
-        lines: a frame begins only after a terminator.
-        flag: the terminator is also the beginning of a frame.
-        checks: conditions for wrong bytes, and the kind of fault.
-        coding: None if bytes are sent as they are.
-    """
-
-    terminator: str
-    last: str
-    pair: str
-    kept: int
-    closing: int
-    after: int
-    limit: int
-    lead: int
-    front: int
-    back: int
-    splits: bool
-    least: int
-    lines: bool
-    flag: bool
-    checks: Sequence[tuple[str, str]]
-    coding: CodingView | None
-
-
-@dataclass(frozen=True)
-class PlacedCheck:
-    """A check value, its offsets in the frame, and the expression for the bytes that it covers.
-
-    Attributes:
-        mark: what the names of its functions end with, "" for the main one.
-        seeded: it covers attributes of the message.
-        main: another algorithm can replace it.
-        early: it is verified before the payload.
-        result: statement that computes the value of a whole frame with `message` and `checksum`.
-        wrong: condition for another value in the frame.
-        case: the call that makes received digits upper case, "" if there are none.
-    """
-
-    name: str
-    view: CheckView
-    start: str
-    end: str
-    covered: str
-    otherwise: int | None
-    mark: str
-    seeded: bool
-    main: bool
-    early: bool
-    result: str
-    wrong: str
-    case: str
-
-
-@dataclass(frozen=True)
-class BlocksView:
-    """The check values of the blocks of a payload."""
-
-    every: int
-    view: CheckView
-
-
-@dataclass(frozen=True)
-class PartsView:
-    """Any other delimited frame.
-
-    Attributes:
-        checks: the check values in wire order.
-        filling: the same in the order in which they are computed.
-        seeds: attributes of message classes that check values cover.
-        blank: the zeros of the check value at the end of the frame, "" if something else is there.
-        trim: bytes of a payload that are sent even if they are zeros at its end, None if all are.
-    """
-
-    title: str
-    checks: Sequence[PlacedCheck]
-    filling: Sequence[PlacedCheck]
-    blank: str
-    trim: int | None
-    seeds: Sequence[str]
-    blocks: BlocksView | None
-    address: AddressView | None
-    length: LengthView | None
-    stuffing: StuffingView | None
-    ended: EndedView | None
-    idle: tuple[float, float] | None
-    preamble: str
-    begins_with: str
-    header: int
-    trailer: int
-    max_frame: int
-    max_payload: int
-    blank_header: str
-    blank_trailer: str
-    id_start: str
-    id_of: str
-    id_of_frame: str
-    address_of: str
-    bare: bool
-    verified: bool
-    head_checks: Sequence[HeadCheck]
-    values: Sequence[str]
-    counter: str
-    tail_tests: Sequence[str]
-
-    template = "delimited"
-
-    @property
-    def main(self) -> PlacedCheck | None:
-        """The main check value, None if there is none."""
-        return next((each for each in self.checks if each.main), None)
-
-    @property
-    def check(self) -> CheckView | None:
-        """The algorithm of the main check value, None if there is none."""
-        return self.main.view if self.main else None
-
-    @property
-    def quick(self) -> bool:
-        """Whether a whole frame can be cut out at once: its end and its bytes are not coded."""
-        return not (self.ended or self.blocks or (self.stuffing and self.stuffing.whole))
-
-    @property
-    def announced(self) -> bool:
-        """Whether a whole header with the right constants and length makes the decoder wait for its frame."""
-        early = any(each.early for each in self.checks)
-        others = any(each.fault and not each.whole for each in self.head_checks)
-        return self.quick and self.length is not None and not early and not others
-
-    @property
-    def no_frame(self) -> Sequence[HeadCheck]:
-        """The conditions for bytes that do not begin a frame."""
-        return [each for each in self.head_checks if each.fault]
-
-
-@dataclass(frozen=True)
-class MarkedView:
-    """A frame whose header and end have a marker bit."""
-
-    title: str
-    check: CheckView | None
-    address: AddressView
-    marker: str
-    address_shift: int
-    address_mask: str
-    id_shift: int
-    id_mask: str
-    end: int
-    most: int
-    checked_default: bool
-
-    template = "marked"
-
-
-@dataclass(frozen=True)
-class PacketView:
-    """Packets, which have no delimiter."""
-
-    title: str
-    requests: str
-    responses: str
-    check_size: int = 0
-    check_bytes: str = ""
-    check_mask: str = ""
-    word: int = 1
-    total: str = ""
-    rejected: str = ""
-
-    template = "packet"
-
-
-FrameView = UniqueView | PartsView | MarkedView | PacketView
+from qlinkgen.plan.tree import Plan
 
 
 def view_of(plan: Plan, title: str, sizes: Sequence[int]) -> FrameView:
@@ -378,145 +62,6 @@ def view_of(plan: Plan, title: str, sizes: Sequence[int]) -> FrameView:
             return _packet(plan, title)
         case _:
             assert_never(receiver)
-
-
-# Unknown requests
-
-
-@dataclass(frozen=True)
-class UnknownView:
-    """The reply to a request with an unknown number: its class, and the arguments of that.
-
-    Attributes:
-        number: the number in ``frame``.
-        address: the address in it, "" if there is none.
-        added: what the number of the reply adds to that of the request, None if it has one of its own.
-        most: the greatest number.
-        by_message: the message tells the end of a frame, so a silence tells that of an unknown one.
-    """
-
-    reply: str
-    arguments: str
-    number: str
-    address: str
-    added: int | None
-    most: str
-    by_message: bool
-
-
-def unknown_view(plan: Plan) -> UnknownView | None:
-    """The reply to a request with an unknown number, None if the decoder is not one of requests."""
-    unknown = plan.protocol.to_unknown
-    if (
-        unknown is None
-        or "request" not in plan.received_directions
-        or unknown.message.name not in plan.by_name
-    ):
-        return None
-    frame = plan.frames["request"]
-    envelope, address = frame.envelope, plan.frame.address
-    arguments = [f"{address_attribute(address)}=node or 0"] if address else []
-    arguments += [f"{attribute(name)}={raw}" for name, raw in unknown.raws]
-    return UnknownView(
-        reply=class_name(plan.by_name[unknown.message.name]),
-        arguments=", ".join(arguments),
-        number=pieces.number(envelope, envelope.id, "frame"),
-        address=pieces.number(envelope, envelope.address, "frame") if envelope.address else "",
-        added=unknown.added,
-        most=in_hex((1 << sum(each.bits for each in envelope.id)) - 1),
-        by_message=isinstance(frame.end, ByMessage),
-    )
-
-
-# Directions
-
-
-def decoded_directions(plan: Plan, ways: Ways) -> list[DecodedDirection]:
-    """Functions and tables for each decoded direction."""
-    return [_decoded_direction(plan, direction, ways) for direction in plan.received_directions]
-
-
-def _decoded_direction(plan: Plan, direction: Direction, ways: Ways) -> DecodedDirection:
-    messages = plan.received(direction)
-    whole = direction == "message"
-    upper = "" if whole else f"_{direction.upper()}"
-    return DecodedDirection(
-        direction=direction,
-        function="decode" if whole else f"decode_{direction}",
-        words="" if whole else f"{direction} ",
-        classes="_MESSAGES" if whole else f"{upper}S",
-        readers=f"{upper}_READERS",
-        asking=", request: Message | None = None" if direction == "response" and plan.asked else "",
-        by_id=_by_id(messages),
-        readers_by_id=_by_id(messages, ".from_checked"),
-        decode=ways.of("_decode", direction),
-        ways=[ways.of(name, direction) for name in ("_split", "_judge", "_MAX_FRAME", "_whole")],
-    )
-
-
-def _by_id(messages: Sequence[MessagePlan], attribute: str = "") -> str:
-    """A dict of message classes, or of one of their attributes, by message id."""
-    rows = (f"{in_hex(each.id)}: {class_name(each)}{attribute}" for each in messages)
-    return f"{{{', '.join(rows)}}}"
-
-
-# Parts of views
-
-
-def check_view(check: Check, mark: str = "") -> CheckView:
-    """The view of a check value."""
-    algorithm = check.algorithm
-    selectable = isinstance(algorithm, Algorithm) and algorithm.width == 16
-    maker, arguments = _algorithm(algorithm)
-    definition = wrapped(f"_CHECKSUM{mark} = {maker}(", arguments, ")", 0)
-    return CheckView(definition, check.size, check.regular or "", _check_bytes(check), selectable, maker)
-
-
-def _algorithm(algorithm: Checksum) -> tuple[str, list[str]]:
-    """The function of the support module that makes an algorithm, and its arguments."""
-    name = f'"{algorithm.name}"'
-    init = [] if not algorithm.init else [f"init={algorithm.init}"]
-    match algorithm:
-        case Sum():
-            form = [] if algorithm.form == "plain" else [f'"{algorithm.form}"']
-            if algorithm.carry:
-                return "carried", [name, *form, *init]
-            return "sum_of", [name, str(algorithm.width), *form, *init]
-        case Xor():
-            return "xor_of", [name, *init]
-        case Fletcher(width=32, modulus=65521):
-            return "adler", [name, *([] if algorithm.init == 1 else [f"init={algorithm.init}"])]
-        case Fletcher():
-            return "fletcher", [name, str(algorithm.half), str(algorithm.modulus), *init]
-        case Algorithm(width=16) if algorithm in catalogue(16):
-            return "find_crc", [name]
-        case Algorithm():
-            return "crc", [name, *_parameters(algorithm)]
-        case _:
-            assert_never(algorithm)
-
-
-def _parameters(algorithm: Algorithm) -> list[str]:
-    digits = (algorithm.width + 3) // 4
-    numbers = {key: f"0x{getattr(algorithm, key):0{digits}X}" for key in ("poly", "init", "xorout")}
-    return [
-        f"width={algorithm.width}",
-        f"poly={numbers['poly']}",
-        f"init={numbers['init']}",
-        f"refin={algorithm.refin}",
-        f"refout={algorithm.refout}",
-        f"xorout={numbers['xorout']}",
-    ]
-
-
-def _check_bytes(check: Check, number: str = "crc") -> str:
-    """Expression for the wire bytes of a check value."""
-    if check.value.digits:
-        return f'b"%0{check.size}X" % {number}'
-    if check.regular:
-        return f'{number}.to_bytes({check.size}, "{check.regular}")'
-    groups = [integers.group_out(number, chunk) for chunk in check.value.chunks]
-    return f"bytes(({', '.join(groups)}{',' if len(groups) == 1 else ''}))"
 
 
 def _address_view(plan: Plan) -> AddressView | None:
@@ -638,14 +183,11 @@ def wrap_lines(view: UniqueView, fixed: int | None) -> list[str]:
     ]
 
 
-# Any other delimited frame
-
-
 def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
     envelope = plan.frame.envelope
     address = _address_view(plan)
     length = _length_view(plan, envelope)
-    checks, filling = _all_placed(envelope, early=not isinstance(plan.frame.end, ByTerminator))
+    checks, filling = all_placed(envelope, early=not isinstance(plan.frame.end, ByTerminator))
     last = envelope.parts[-1]
     return PartsView(
         title=title,
@@ -866,78 +408,6 @@ def _bare_checks(envelope: Envelope, part: Part, reached: str, no_frame: str) ->
         yield HeadCheck(f"{reached} not _allowed(head, known)", no_frame, "address")
 
 
-def placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> PlacedCheck:
-    """The view of a check value."""
-    covered = " + ".join(
-        f"message.{seed_name(run)}"
-        if isinstance(run, Seed)
-        else f"frame[{_edge(envelope, run[0])}:{_edge(envelope, run[-1], after=True)}]"
-        for run in envelope.coverage(part)
-    )
-    view = check_view(part.check, mark)
-    start, end = _edge(envelope, part), _edge(envelope, part, after=True)
-    seeded, main = part in envelope.seeded, part is envelope.check
-    checksum = "checksum" if main else f"_CHECKSUM{mark}"
-    case = ".upper()" if part.check.value.digits else ""
-    if view.order and view.size <= 2 and part.check.otherwise is None:
-        place = int(start or "0")
-        sent = integers.joined("frame", range(place, place + view.size), view.order)
-        result = f"crc = {checksum}.compute({covered}, {checksum}.start)"
-        wrong = f"crc != {sent}"
-    else:
-        given = f"frame{', message' if seeded else ''}{', checksum' if main else ''}"
-        result = f"right = _check{mark}({given})"
-        wrong = f"right != frame[{start}:{end}]{case}"
-    return PlacedCheck(
-        name=part.name,
-        view=view,
-        start=start,
-        end=end,
-        covered=covered,
-        otherwise=part.check.otherwise,
-        mark=mark,
-        seeded=seeded,
-        main=main,
-        early=early and part in envelope.header_checks,
-        result=result,
-        wrong=wrong,
-        case=case,
-    )
-
-
-def _all_placed(envelope: Envelope, *, early: bool) -> tuple[list[PlacedCheck], list[PlacedCheck]]:
-    """The views of all check values in wire order, and in the order in which they are computed.
-
-    ``early``: those of the header alone are verified before the payload.
-    """
-    others = [part for part in envelope.checks if part is not envelope.check]
-    views = {
-        part.name: placed(envelope, part, f"_{others.index(part) + 2}" if part in others else "", early=early)
-        for part in envelope.checks
-    }
-    return list(views.values()), [views[part.name] for part in envelope.filling]
-
-
-def seed_name(seed: Seed) -> str:
-    """The attribute of a message class that holds the bytes of a seed."""
-    return f"SEED_{seed.attribute.upper()}"
-
-
-def _edge(envelope: Envelope, part: Part, *, after: bool = False) -> str:
-    """The beginning or end of a part in a slice of the frame."""
-    if part is envelope.payload:
-        place = -envelope.trailer_size if after else envelope.header_size
-    elif part in envelope.front:
-        place = envelope.offset(part) + (part.size if after else 0)
-        return str(place) if place else ""
-    else:
-        place = -envelope.from_end(part) + (part.size if after else 0)
-    return str(place) if place else ""
-
-
-# Marked frames and packets
-
-
 def _marked(plan: Plan, title: str) -> MarkedView:
     end = plan.frame.end
     assert isinstance(end, ByMark)
@@ -961,8 +431,8 @@ def _marked(plan: Plan, title: str) -> MarkedView:
 
 def _packet(plan: Plan, title: str) -> PacketView:
     check = plan.frame.check
-    requests = _by_id([message for message in plan.messages if message.direction != "response"])
-    responses = _by_id([message for message in plan.messages if message.direction == "response"])
+    requests = by_id([message for message in plan.messages if message.direction != "response"])
+    responses = by_id([message for message in plan.messages if message.direction == "response"])
     if check is None:
         return PacketView(title, requests, responses)
     assert isinstance(check.algorithm, Sum)
@@ -971,7 +441,7 @@ def _packet(plan: Plan, title: str) -> PacketView:
         requests=requests,
         responses=responses,
         check_size=check.size,
-        check_bytes=_check_bytes(check, "check"),
+        check_bytes=check_bytes(check, "check"),
         check_mask=f"0x{check.algorithm.mask:X}",
         word=check.word,
         total={"plain": "total", "inverted": "~total", "zero": "-total"}[check.algorithm.form],

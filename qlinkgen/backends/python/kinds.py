@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import assert_never
 
 from qlinkgen.backends.python import integers, pieces
-from qlinkgen.backends.python.frames import FrameView, PlacedCheck, check_view, placed
+from qlinkgen.backends.python.frame_checks import check_view, placed
+from qlinkgen.backends.python.frame_views import FrameView, PlacedCheck
 from qlinkgen.backends.python.layout import in_hex, literal
 from qlinkgen.model.naming import address_argument, address_attribute
 from qlinkgen.plan.ends import ByLength

@@ -12,7 +12,13 @@ from qlinkgen.backends.base import banner
 from qlinkgen.backends.python import frames, tables
 from qlinkgen.backends.python.classes import ClassBuilder, ClassModel
 from qlinkgen.backends.python.fitted import fitted
-from qlinkgen.backends.python.frames import MarkedView, PacketView, PartsView, UniqueView
+from qlinkgen.backends.python.frame_directions import (
+    DecodedDirection,
+    UnknownView,
+    decoded_directions,
+    unknown_view,
+)
+from qlinkgen.backends.python.frame_views import MarkedView, PacketView, PartsView, UniqueView
 from qlinkgen.backends.python.kinds import AnyView, KindsView, kinds_view
 from qlinkgen.backends.python.layout import WIDTH
 from qlinkgen.backends.python.names import by_kind, class_name, imported
@@ -86,12 +92,12 @@ class ModuleView:
     """The variables of the templates of a module; `f` is its frame."""
 
     f: AnyView
-    decoded_directions: Sequence[frames.DecodedDirection]
+    decoded_directions: Sequence[DecodedDirection]
     direction_type: str
     direction_default: str
     asked: Sequence[str]
     carrier: str
-    unknown: frames.UnknownView | None
+    unknown: UnknownView | None
     stream_decoder: Sequence[str]
     doc: Sequence[str]
     enums: Sequence[tables.ConstantsModel]
@@ -126,15 +132,15 @@ class Module:
         title = one_line(plan.protocol.title)
         views: Mapping[str, AnyView] = {way: _view(each, title, sizes) for way, each in plan.ways.items()}
         view, sections = views[list(views)[-1]], Sections(views, plan.received_directions, bool(plan.beside))
-        decoded_directions = frames.decoded_directions(plan, sections.ways)
-        quoted = [f'"{each.direction}"' for each in decoded_directions]
+        decoded = decoded_directions(plan, sections.ways)
+        quoted = [f'"{each.direction}"' for each in decoded]
         module = ModuleView(
             f=view,
-            decoded_directions=decoded_directions,
+            decoded_directions=decoded,
             direction_type=f"Literal[{', '.join(quoted)}]",
             direction_default=f" = {quoted[0]}" if len(quoted) == 1 else "",
             asked=_asked(plan),
-            unknown=frames.unknown_view(plan),
+            unknown=unknown_view(plan),
             carrier=class_name(plan.carrier) if plan.carrier else "",
             stream_decoder=_stream_decoder(quoted),
             doc=self._doc(),
@@ -146,7 +152,7 @@ class Module:
             records=[MessageRow(each.name, self.place.classes[each.name]) for each in plan.layouts],
             scales=self.builder.scales,
             classes=self._classes(models, view, sections.ways),
-            public=self._public(view, decoded_directions),
+            public=self._public(view, decoded),
             imports=self._imports(list(views.values()), models),
             directed=plan.directed,
             quick=all(isinstance(each, PartsView) and each.quick for each in views.values()),
@@ -251,7 +257,7 @@ class Module:
             typing=sorted(typing),
         )
 
-    def _public(self, view: AnyView, decoded_directions: Sequence[frames.DecodedDirection]) -> list[str]:
+    def _public(self, view: AnyView, decoded: Sequence[DecodedDirection]) -> list[str]:
         names = [class_name(message) for message in self.plan.messages]
         constants: list[Enum | Flags] = [*self.plan.enums, *self.plan.flags]
         names += [self.place.classes[each.name] for each in (*constants, *self.plan.layouts)]
@@ -259,8 +265,8 @@ class Module:
         names += ["Many"] if any(each.many for each in self.plan.commands) else []
         names += ["OtherReply"] if any(each.meant for each in self.plan.commands) else []
         names += ["BUS", "COMMANDS", "MESSAGES", "Message", "StreamDecoder", *_PUBLIC]
-        names += [each.function for each in decoded_directions]
-        names += ["answer_unknown"] if frames.unknown_view(self.plan) else []
+        names += [each.function for each in decoded]
+        names += ["answer_unknown"] if unknown_view(self.plan) else []
         names += ["answer_to"] if _asked(self.plan) else []
         match view:
             case PacketView():

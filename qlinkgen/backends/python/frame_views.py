@@ -1,0 +1,315 @@
+"""Views of frames for the templates: names, numbers and expressions, one for each kind of receiver."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from qlinkgen.backends.python.coding import CodingView
+
+
+@dataclass(frozen=True)
+class CheckView:
+    """The check value of a frame.
+
+    Attributes:
+        definition: statement that defines the algorithm.
+        size: size on the wire.
+        order: byte order of a value that is sent whole, "" if bits are omitted.
+        bytes: expression for the bytes of the number ``crc``.
+        selectable: another algorithm of the catalogue can replace it.
+        maker: function of the support module that the definition calls.
+    """
+
+    definition: list[str]
+    size: int
+    order: str
+    bytes: str
+    selectable: bool
+    maker: str
+
+
+@dataclass(frozen=True)
+class AddressView:
+    """The address of a frame.
+
+    Attributes:
+        name: attribute of the messages.
+        parameter: name of the parameter of ``from_bytes``.
+        bytes: expression for the bytes of the part with ``number``, "" if the address shares a marked byte.
+        default: the default address.
+        limit: the greatest address, "" if the bytes hold no greater one.
+    """
+
+    name: str
+    parameter: str
+    bytes: str
+    default: int
+    limit: str = ""
+
+
+@dataclass(frozen=True)
+class UniqueView:
+    """A frame with a preamble that occurs nowhere else."""
+
+    title: str
+    idle: tuple[float, float] | None
+    check: CheckView
+    address: AddressView | None
+    preamble: str
+    mark: str
+    insert: str
+    header: int
+    overhead: int
+    length_end: int
+    uncounted: int
+    min_length: int
+    max_length: int
+    body_start: int
+    payload_of_body: str
+    id_at: int
+    blank_header: str
+    trailer: int
+    whole_sizes: Sequence[int]
+    prefix: str
+    check_letter: str
+
+    template = "unique"
+
+
+@dataclass(frozen=True)
+class HeadCheck:
+    """A condition for bytes that do not begin a frame, in wire order, and the result of ``_split``.
+
+    Attributes:
+        fault: "number", "address" or "constant" if only a decoder of one whole frame reports it.
+        whole: the condition for a whole header, "" if decoding its message finds the same.
+    """
+
+    test: str
+    found: str
+    fault: str = ""
+    whole: str = ""
+
+
+@dataclass(frozen=True)
+class LengthView:
+    """The length of a frame: bounds, offsets, its value in ``head`` and the bytes of ``number``.
+
+    Attributes:
+        quick: the same value; raises an IndexError if the header is too short, unless ``sliced``.
+        sliced: if the header is too short, ``quick`` is a wrong number.
+        bounded: its part holds numbers beyond the bounds.
+    """
+
+    bias: int
+    least: int
+    most: int
+    start: int
+    end: int
+    value: str
+    quick: str
+    sliced: bool
+    bytes: str
+    scale: int
+    bounded: bool
+
+
+@dataclass(frozen=True)
+class StuffingView:
+    """Stuffing of ``whole`` frames except their first and last bytes, or of payloads only."""
+
+    whole: bool
+    after: str
+    insert: str
+    front: int
+    back: int
+
+
+@dataclass(frozen=True)
+class EndedView:
+    """A terminator, and the coding of the bytes before it.
+
+    Attributes:
+        last: its last byte.
+        pair: its first byte if that also begins pairs of coded bytes, otherwise "".
+        kept: number of its bytes that may begin the next frame.
+        closing: size of the terminator and what follows it.
+        after: size of what follows it.
+        limit: maximum size of a frame up to its terminator.
+        lead: size of the constant at the beginning.
+        front: number of uncoded bytes at the beginning.
+        back: number of uncoded bytes at the end.
+        splits: uncoded bytes are not only the first constant and the terminator.
+        least: minimum size of a payload.
+        lines: a frame begins only after a terminator.
+        flag: the terminator is also the beginning of a frame.
+        checks: conditions for wrong bytes, and the kind of fault.
+        coding: None if bytes are sent as they are.
+    """
+
+    terminator: str
+    last: str
+    pair: str
+    kept: int
+    closing: int
+    after: int
+    limit: int
+    lead: int
+    front: int
+    back: int
+    splits: bool
+    least: int
+    lines: bool
+    flag: bool
+    checks: Sequence[tuple[str, str]]
+    coding: CodingView | None
+
+
+@dataclass(frozen=True)
+class PlacedCheck:
+    """A check value, its offsets in the frame, and the expression for the bytes that it covers.
+
+    Attributes:
+        mark: what the names of its functions end with, "" for the main one.
+        seeded: it covers attributes of the message.
+        main: another algorithm can replace it.
+        early: it is verified before the payload.
+        result: statement that computes the value of a whole frame with `message` and `checksum`.
+        wrong: condition for another value in the frame.
+        case: the call that makes received digits upper case, "" if there are none.
+    """
+
+    name: str
+    view: CheckView
+    start: str
+    end: str
+    covered: str
+    otherwise: int | None
+    mark: str
+    seeded: bool
+    main: bool
+    early: bool
+    result: str
+    wrong: str
+    case: str
+
+
+@dataclass(frozen=True)
+class BlocksView:
+    """The check values of the blocks of a payload."""
+
+    every: int
+    view: CheckView
+
+
+@dataclass(frozen=True)
+class PartsView:
+    """Any other delimited frame.
+
+    Attributes:
+        checks: the check values in wire order.
+        filling: the same in the order in which they are computed.
+        seeds: attributes of message classes that check values cover.
+        blank: the zeros of the check value at the end of the frame, "" if something else is there.
+        trim: bytes of a payload that are sent even if they are zeros at its end, None if all are.
+    """
+
+    title: str
+    checks: Sequence[PlacedCheck]
+    filling: Sequence[PlacedCheck]
+    blank: str
+    trim: int | None
+    seeds: Sequence[str]
+    blocks: BlocksView | None
+    address: AddressView | None
+    length: LengthView | None
+    stuffing: StuffingView | None
+    ended: EndedView | None
+    idle: tuple[float, float] | None
+    preamble: str
+    begins_with: str
+    header: int
+    trailer: int
+    max_frame: int
+    max_payload: int
+    blank_header: str
+    blank_trailer: str
+    id_start: str
+    id_of: str
+    id_of_frame: str
+    address_of: str
+    bare: bool
+    verified: bool
+    head_checks: Sequence[HeadCheck]
+    values: Sequence[str]
+    counter: str
+    tail_tests: Sequence[str]
+
+    template = "delimited"
+
+    @property
+    def main(self) -> PlacedCheck | None:
+        """The main check value, None if there is none."""
+        return next((each for each in self.checks if each.main), None)
+
+    @property
+    def check(self) -> CheckView | None:
+        """The algorithm of the main check value, None if there is none."""
+        return self.main.view if self.main else None
+
+    @property
+    def quick(self) -> bool:
+        """Whether a whole frame can be cut out at once: its end and its bytes are not coded."""
+        return not (self.ended or self.blocks or (self.stuffing and self.stuffing.whole))
+
+    @property
+    def announced(self) -> bool:
+        """Whether a whole header with the right constants and length makes the decoder wait for its frame."""
+        early = any(each.early for each in self.checks)
+        others = any(each.fault and not each.whole for each in self.head_checks)
+        return self.quick and self.length is not None and not early and not others
+
+    @property
+    def no_frame(self) -> Sequence[HeadCheck]:
+        """The conditions for bytes that do not begin a frame."""
+        return [each for each in self.head_checks if each.fault]
+
+
+@dataclass(frozen=True)
+class MarkedView:
+    """A frame whose header and end have a marker bit."""
+
+    title: str
+    check: CheckView | None
+    address: AddressView
+    marker: str
+    address_shift: int
+    address_mask: str
+    id_shift: int
+    id_mask: str
+    end: int
+    most: int
+    checked_default: bool
+
+    template = "marked"
+
+
+@dataclass(frozen=True)
+class PacketView:
+    """Packets, which have no delimiter."""
+
+    title: str
+    requests: str
+    responses: str
+    check_size: int = 0
+    check_bytes: str = ""
+    check_mask: str = ""
+    word: int = 1
+    total: str = ""
+    rejected: str = ""
+
+    template = "packet"
+
+
+FrameView = UniqueView | PartsView | MarkedView | PacketView
