@@ -7,7 +7,7 @@ import pytest
 from qlinkgen.schema import shipped
 from tests.soak.frames import Trial, run
 from tests.support.whole.reference import Seen, Wrong
-from tests.support.whole.reference.document import Message
+from tests.support.whole.reference.layouts import Message
 from tests.support.whole.targets import PythonTarget
 
 

@@ -25,7 +25,7 @@ from qlinkgen.schema import find, load, shipped
 from tests.support.cdriver import Driver, build
 from tests.support.whole import chance
 from tests.support.whole.reference import Reference, Seen, Wrong
-from tests.support.whole.reference.document import Message
+from tests.support.whole.reference.layouts import Message
 from tests.support.whole.targets import CTarget, InterpreterTarget, PythonTarget, Target, printed_codec
 
 #: Frames per batch of one process.

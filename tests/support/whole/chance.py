@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from tests.support.whole.reference import Raw, Reference
-from tests.support.whole.reference.document import (
+from tests.support.whole.reference.frames import Frame
+from tests.support.whole.reference.layouts import (
     Kind,
     Message,
     Number,
@@ -19,7 +20,6 @@ from tests.support.whole.reference.document import (
     Slot,
     Value,
 )
-from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.special import Packets
 from tests.support.whole.reference.values import Wrong, default_record, encode, holds, meets
 

@@ -11,7 +11,7 @@ from tests.support.whole import endings, one_way
 from tests.support.whole.endings import Ending
 from tests.support.whole.mixed import Mixture
 from tests.support.whole.reference import checks
-from tests.support.whole.reference.document import bits_of_type
+from tests.support.whole.reference.fields import bits_of_type
 
 Doc = dict[str, Any]
 _LEADS = ("7E", "A5 A5", "AA AA", "02 02", "02", "FF FF FD 00", "AA 55", "10 02", "68", "3A", "A5 A5 A5")

@@ -6,7 +6,7 @@ import random
 from dataclasses import dataclass, field
 from typing import Any
 
-from tests.support.whole.reference.document import bits_of_type
+from tests.support.whole.reference.fields import bits_of_type
 
 Doc = dict[str, Any]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from typing import Any
 
-from tests.support.whole.reference.document import bits_of_type
+from tests.support.whole.reference.fields import bits_of_type
 
 Doc = dict[str, Any]
 _NAMES = ("origin", "outcome", "stamp")

@@ -27,9 +27,9 @@ from qlinkgen.plan.receive import PacketReceiver as PlannedPackets
 from qlinkgen.plan.receive import receiver
 from tests.support.cdriver import Driver
 from tests.support.whole.reference import Event, Raw, Reference, Seen, Wrong
-from tests.support.whole.reference.document import Message, Number, Record, Records, Run, Slot, Value
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.kinds import Kinds
+from tests.support.whole.reference.layouts import Message, Number, Record, Records, Run, Slot, Value
 from tests.support.whole.reference.special import Packets
 from tests.support.whole.reference.values import decode as decode_payload
 from tests.support.whole.reference.values import default, holds

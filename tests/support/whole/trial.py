@@ -28,9 +28,9 @@ from qlinkgen.schema import loads
 from tests.support.cdriver import WARNINGS, Driver, build
 from tests.support.whole import chance, schemas
 from tests.support.whole.reference import Reference, Seen, Wrong
-from tests.support.whole.reference.document import Message
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.kinds import Kinds
+from tests.support.whole.reference.layouts import Message
 from tests.support.whole.reference.special import Packets
 from tests.support.whole.targets import (
     ConstructTarget,

@@ -6,7 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tests.support.whole.reference.document import Doc, Fields, Message, long_form
+from tests.support.whole.reference.document import long_form
+from tests.support.whole.reference.fields import Fields
+from tests.support.whole.reference.layouts import Message
+from tests.support.whole.reference.notation import Doc
 
 CARRIER = "unasked"
 

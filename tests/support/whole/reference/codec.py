@@ -7,17 +7,11 @@ from dataclasses import dataclass, replace
 
 from tests.support.whole.reference import document, values
 from tests.support.whole.reference.asked import CARRIER, Asked, asked
-from tests.support.whole.reference.document import (
-    Direction,
-    Doc,
-    Fields,
-    Message,
-    Number,
-    part_doc,
-    whole_span,
-)
+from tests.support.whole.reference.fields import Fields, bits_of
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.kinds import Kinds, address_of
+from tests.support.whole.reference.layouts import Message, Number
+from tests.support.whole.reference.notation import Direction, Doc, load, part_doc, whole_span
 from tests.support.whole.reference.receivers import (
     Event,
     Hunter,
@@ -44,7 +38,7 @@ class Reference:
 
     def __init__(self, text: str) -> None:
         """Read the text of a schema."""
-        data = document.load(text)
+        data = load(text)
         self.frame: Frame | Marked | Packets | Kinds
         self.requests: Frame | Marked | Packets | Kinds
         self.messages: tuple[Message, ...]
@@ -77,7 +71,7 @@ class Reference:
         addressed = [
             inner or name
             for name, spec in parts.items()
-            for inner, role, *_ in document.bits_of(spec)
+            for inner, role, *_ in bits_of(spec)
             if role == "address"
         ]
         self.address_name = addressed[0] if addressed else "address" if "marked" in shape else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tests.support.whole.reference.document import Doc, octets
+from tests.support.whole.reference.notation import Doc, octets
 from tests.support.whole.reference.values import Wrong
 
 

@@ -11,9 +11,8 @@ from typing import Any
 
 from tests.support.whole.reference import checks
 from tests.support.whole.reference.codings import codings
-from tests.support.whole.reference.document import (
-    Doc,
-    Fields,
+from tests.support.whole.reference.fields import Fields, bits_of, bits_of_type, byte_pieces
+from tests.support.whole.reference.layouts import (
     Message,
     Number,
     Packed,
@@ -22,14 +21,9 @@ from tests.support.whole.reference.document import (
     Run,
     Slot,
     Test,
-    bits_of,
-    bits_of_type,
-    byte_pieces,
-    octets,
-    part_doc,
     size_of,
-    whole_span,
 )
+from tests.support.whole.reference.notation import Doc, octets, part_doc, whole_span
 from tests.support.whole.reference.values import Raw, Wrong, get, holds, items_of, met, note, put
 from tests.support.whole.reference.values import check as check_range
 

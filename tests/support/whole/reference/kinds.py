@@ -7,8 +7,10 @@ from dataclasses import replace
 from typing import Any
 
 from tests.support.whole.reference import document
-from tests.support.whole.reference.document import Direction, Doc, Fields, Message, bits_of, part_doc
+from tests.support.whole.reference.fields import Fields, bits_of
 from tests.support.whole.reference.frames import Frame, NeedMore, Refused
+from tests.support.whole.reference.layouts import Message
+from tests.support.whole.reference.notation import Direction, Doc, part_doc
 from tests.support.whole.reference.receivers import Event, Receiver, Searcher
 from tests.support.whole.reference.values import Raw, Wrong
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from tests.support.whole.reference import values
-from tests.support.whole.reference.document import Message
 from tests.support.whole.reference.frames import Cut, Frame, NeedMore, Refused, Splitter
+from tests.support.whole.reference.layouts import Message
 from tests.support.whole.reference.special import Marked, Packets
 from tests.support.whole.reference.values import Raw, Wrong
 

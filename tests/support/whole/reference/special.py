@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from tests.support.whole.reference import checks
-from tests.support.whole.reference.document import Doc, Fields, Message, part_doc, whole_span
+from tests.support.whole.reference.fields import Fields
 from tests.support.whole.reference.frames import part_of
+from tests.support.whole.reference.layouts import Message
+from tests.support.whole.reference.notation import Doc, part_doc, whole_span
 from tests.support.whole.reference.values import Wrong, put
 
 

@@ -7,7 +7,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import TypeAlias
 
-from tests.support.whole.reference.document import (
+from tests.support.whole.reference.layouts import (
     Kind,
     Message,
     Number,

@@ -1,0 +1,339 @@
+"""The types of fields, and messages, as bytes and values."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from tests.support.whole.reference.notation import Direction, Role
+
+_REALS = {16: ">e", 32: ">f", 64: ">d"}
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """An integer; `pieces` are the (lowest bit, bits) of its wire bytes in order."""
+
+    bits: int
+    signed: bool
+    pieces: tuple[tuple[int, int], ...]
+    low: int
+    high: int
+    default: int = 0
+    scale: Fraction | None = None
+    offset: Fraction = Fraction(0)
+    truth: bool = False
+    #: Bits that must be zero.
+    forbidden: int = 0
+    #: Each byte has two decimal digits.
+    bcd: bool = False
+    #: Of a number as text: base, minimum and maximum number of characters, digits after the point, whether
+    #: it may have a sign.
+    text: tuple[int, int, int, int, bool] | None = None
+    #: The integer is the bits of a floating-point number, perhaps with bounds.
+    real: bool = False
+    bounds: tuple[float, float] | None = None
+
+    def number(self, raw: int) -> float:
+        """The floating-point number of bits."""
+        return float(struct.unpack(_REALS[self.bits], raw.to_bytes(self.bits // 8, "big"))[0])
+
+    def pattern(self, number: float) -> int:
+        """The bits of a floating-point number; of every NaN the same."""
+        return int.from_bytes(
+            struct.pack(_REALS[self.bits], math.nan if math.isnan(number) else number), "big"
+        )
+
+    def told(self, raw: int) -> int:
+        """A received integer without what a NaN does not preserve."""
+        return self.pattern(math.nan) if self.real and math.isnan(self.number(raw)) else raw
+
+    def native(self, raw: int) -> Fraction | int | bool | float:
+        """The value in the unit, exactly."""
+        if self.truth:
+            return bool(raw)
+        if self.real:
+            return self.number(raw)
+        return raw if self.scale is None else raw * self.scale + self.offset
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Bytes, text, or an array; `high` is None until the rest of the payload is known."""
+
+    item: Number | None
+    text: bool
+    low: int
+    high: int | None
+    default: tuple[int, ...]
+    #: Items of a few bits in a row, the first one in these bits.
+    packed: str = ""
+    #: The byte that fills up a shorter value.
+    pad: bytes = b""
+    #: The character after a text, which the text does not contain.
+    end: bytes = b""
+
+    @property
+    def step(self) -> int:
+        """Size of an item."""
+        return len(self.item.pieces) if self.item else 1
+
+    def bytes_of(self, number: int) -> int:
+        """Size of so many items."""
+        if self.packed and self.item:
+            return -(-number * self.item.bits // 8)
+        return number * self.step + len(self.end)
+
+    def items_in(self, size: int) -> int:
+        """Number of items that fit."""
+        return 8 * size // self.item.bits if self.packed and self.item else size // self.step
+
+    @property
+    def most(self) -> int:
+        """Maximum number of items."""
+        assert self.high is not None
+        return self.high
+
+
+@dataclass(frozen=True, slots=True)
+class Packed:
+    """An integer divided into bit fields: (name, lowest bit, number)."""
+
+    pieces: tuple[tuple[int, int], ...]
+    bits: int
+    members: tuple[tuple[str, int, Number], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """Fields that are one value."""
+
+    slots: tuple[Slot, ...]
+
+    @property
+    def size(self) -> int:
+        """Maximum size on the wire."""
+        return most_bytes(self.slots)
+
+    @property
+    def least(self) -> int:
+        """Minimum size on the wire."""
+        return sum(slot.least_bytes for slot in self.slots if not slot.conditional)
+
+    @property
+    def constant(self) -> bool:
+        """Whether its size is constant."""
+        return all(slot.fixed and not slot.conditional for slot in self.slots)
+
+    def values(self) -> Iterator[tuple[str, Value]]:
+        """Values in wire order."""
+        return values_of(self.slots)
+
+
+@dataclass(frozen=True, slots=True)
+class Records:
+    """An array of records; `high` is None until the rest of the payload is known."""
+
+    record: Record
+    low: int
+    high: int | None
+    packed: str = ""
+    #: Tests of the record that ends the array.
+    last: tuple[Test, ...] = ()
+
+    @property
+    def step(self) -> int:
+        """Size of an item."""
+        return self.record.size
+
+    def bytes_of(self, number: int) -> int:
+        """Size of so many records."""
+        return number * self.step
+
+    def items_in(self, size: int) -> int:
+        """Number of records that fit."""
+        return size // self.record.least
+
+    @property
+    def most(self) -> int:
+        """Maximum number of items."""
+        assert self.high is not None
+        return self.high
+
+
+Kind = Number | Run | Packed | Record | Records
+
+
+#: The kind of a value.
+Value = Number | Run | Record | Records
+
+
+#: A test of an earlier value: its name, ranges, whether they are excluded.
+Test = tuple[str, tuple[tuple[int, int], ...], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """A field."""
+
+    name: str
+    kind: Kind
+    role: Role = "value"
+    counts: str = ""
+    counts_in: str = "items"
+    #: Bytes of other fields that it counts as well.
+    more: int = 0
+    #: Tests of earlier values: name, ranges, whether they are excluded.
+    when: tuple[Test, ...] = ()
+    optional: bool = False
+    #: A new message has it.
+    given: bool = True
+    #: The value of which it is a case; its own name is then unknown to users.
+    choice: str = ""
+
+    @property
+    def conditional(self) -> bool:
+        """Whether it may be absent."""
+        return self.optional or bool(self.when)
+
+    def values(self) -> tuple[tuple[str, Value], ...]:
+        """Its values."""
+        return tuple(values_of((self,)))
+
+    @property
+    def fixed(self) -> bool:
+        """Whether its size is constant, where it is present."""
+        if self.walked:
+            return False
+        return not isinstance(self.kind, Run | Records) or self.kind.low == self.kind.high
+
+    @property
+    def walked(self) -> bool:
+        """Whether it has records that are read one by one."""
+        if isinstance(self.kind, Records):
+            return bool(self.kind.last) or not self.kind.record.constant
+        return isinstance(self.kind, Record) and not self.kind.constant
+
+    @property
+    def least_bytes(self) -> int:
+        """Minimum size on the wire."""
+        kind = self.kind
+        if isinstance(kind, Record):
+            return kind.least
+        if isinstance(kind, Records):
+            return kind.low * kind.record.least
+        return kind.bytes_of(kind.low) if isinstance(kind, Run | Records) else size_of(kind)
+
+    @property
+    def most_bytes(self) -> int:
+        """Maximum size on the wire; 0 for a run without a bound."""
+        kind = self.kind
+        return kind.bytes_of(kind.high or 0) if isinstance(kind, Run | Records) else size_of(kind)
+
+
+def most_bytes(slots: Iterable[Slot], along: Slot | None = None) -> int:
+    """Maximum size of slots, of those that may be present `along` with another one."""
+    kept = [slot for slot in slots if along is None or not _apart(slot, along)]
+    if along is not None:  # records of variable size may leave more
+        walked = [slot for slot in kept if slot.walked]
+        kept = [slot for slot in kept if not slot.walked]
+        return most_bytes(kept) + sum(slot.least_bytes for slot in walked if not slot.conditional)
+    size = sum(slot.most_bytes for slot in kept if not slot.when)
+    for name in {slot.when[0][0] for slot in kept if slot.when}:
+        group = [slot for slot in kept if slot.when and slot.when[0][0] == name]
+        ends = [
+            end for slot in group for low, high in slot.when[0][1] for end in (low - 1, low, high, high + 1)
+        ]
+        size += max(sum(slot.most_bytes for slot in group if is_met(slot.when[0], end)) for end in ends)
+    return size
+
+
+def is_met(test: Test, number: int) -> bool:
+    return any(low <= number <= high for low, high in test[1]) != test[2]
+
+
+def _apart(one: Slot, other: Slot) -> bool:
+    """Whether two slots are never present together."""
+    for first in one.when:
+        for second in other.when:
+            ends = [end for low, high in (*first[1], *second[1]) for end in (low - 1, low, high, high + 1)]
+            if first[0] == second[0] and not any(is_met(first, end) and is_met(second, end) for end in ends):
+                return True
+    return False
+
+
+def size_of(kind: Number | Packed | Record) -> int:
+    """Size of a single value."""
+    return kind.size if isinstance(kind, Record) else len(kind.pieces)
+
+
+def values_of(slots: Iterable[Slot]) -> Iterator[tuple[str, Value]]:
+    for slot in slots:
+        if isinstance(slot.kind, Packed):
+            yield from ((name, number) for name, _, number in slot.kind.members)
+        elif slot.role == "value":
+            yield slot.name, slot.kind
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message in one direction."""
+
+    name: str
+    number: int
+    direction: Direction
+    slots: tuple[Slot, ...]
+    addresses: tuple[tuple[int, int], ...]
+    default_address: int
+    empty_is_default: bool = False
+    checked: bool = True
+    #: Values of its frame.
+    beside: tuple[tuple[str, Number], ...] = ()
+    #: Zeros at the end of its payload are not sent after so many bytes; None: all are sent.
+    trim: int | None = None
+    #: The byte between texts, and the bytes that a text does not have.
+    separator: bytes = b""
+    barred: bytes = b""
+    #: Kinds of frame that carry it, if there are several.
+    frames: tuple[str, ...] = ()
+    #: Maximum size of a payload in the frame.
+    limit: int | None = None
+
+    def values(self) -> Iterator[tuple[str, Value]]:
+        """Values in wire order, those of the frame first."""
+        yield from self.beside
+        yield from values_of(self.slots)
+
+    def by_name(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Values as users see them: of a choice that of its case, under the name of the choice."""
+        found = {name: given[name] for name, _ in self.beside}
+        for slot in self.slots:
+            for name, _ in slot.values():
+                if not slot.choice or found.get(slot.choice) is None:
+                    found[slot.choice or name] = given[name]
+        return found
+
+    @property
+    def walked(self) -> bool:
+        """Whether the places of fields depend on values."""
+        return any(
+            slot.conditional or slot.walked or (isinstance(slot.kind, Run) and slot.kind.end)
+            for slot in self.slots
+        )
+
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """Minimum and maximum size of the payload."""
+        always = [slot for slot in self.slots if not slot.conditional]
+        most = most_bytes(self.slots)
+        if self.limit is not None and any(slot.walked for slot in self.slots):
+            most = min(most, self.limit)
+        return sum(slot.least_bytes for slot in always), most
+
+    def allows(self, address: int) -> bool:
+        """Whether the address is legal for the message."""
+        return not self.addresses or any(low <= address <= high for low, high in self.addresses)

@@ -1,0 +1,131 @@
+"""How a schema file is read: numbers, ranges and bytes as they are written."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from typing import Any, Literal
+
+import yaml
+
+Doc = dict[str, Any]
+
+
+Direction = Literal["request", "response", "message"]
+
+
+Role = Literal["value", "constant", "reserved", "count"]
+
+
+class Prefixed(int):
+    """A number written as 0x10, not as 16: where bytes are expected, only the second is a pair of digits."""
+
+
+class _Loader(yaml.CSafeLoader):
+    """Loads numbers with a decimal point exactly; on, off, yes and no as text."""
+
+    def exact(self, node: yaml.ScalarNode) -> Fraction:
+        """The exact number."""
+        return Fraction(node.value)
+
+    def number(self, node: yaml.ScalarNode) -> int:
+        value = int(self.construct_yaml_int(node))
+        return value if node.value.isdecimal() else Prefixed(value)
+
+
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in pairs if tag != "tag:yaml.org,2002:bool"]
+    for first, pairs in _Loader.yaml_implicit_resolvers.items()
+}
+
+
+_Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile(r"true\Z|false\Z"), list("tf"))
+
+
+_Loader.add_constructor("tag:yaml.org,2002:float", _Loader.exact)
+
+
+_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.number)
+
+
+def _newest(node: Any) -> Any:
+    """What the newest version of the protocol has."""
+    if isinstance(node, list):
+        return [_newest(each) for each in node]
+    if not isinstance(node, dict):
+        return node
+    return {
+        name: _newest(each) for name, each in node.items() if not (isinstance(each, dict) and "until" in each)
+    }
+
+
+def load(text: str) -> Doc:
+    """The plain data of a schema file."""
+    document: Doc = _newest(yaml.load(text, _Loader))
+    parts = document.get("frame", {}).get("parts", {})
+    # Silence has no bytes, and frames end without it.
+    for name in [
+        name for name, spec in parts.items() if isinstance(spec, dict) and spec.get("role") == "idle"
+    ]:
+        del parts[name]
+    return document
+
+
+def exact(given: object) -> Fraction:
+    """A number in any of its notations."""
+    text = str(given).replace(" ", "").replace("_", "")
+    if text.lower().startswith("0x"):
+        return Fraction(int(text, 16))
+    if "^" in text:
+        top, base, power = re.split(r"[/^]", text)
+        return Fraction(int(top), int(base) ** int(power))
+    if "/" in text:
+        top, below = text.split("/")
+        return Fraction(top) / int(below)
+    return Fraction(text)
+
+
+def span(given: object) -> tuple[Fraction, Fraction]:
+    """A range, or one number."""
+    first, _, last = str(given).partition("..")
+    return exact(first), exact(last or first)
+
+
+def whole_span(given: object) -> tuple[int, int]:
+    """A range of whole numbers."""
+    first, last = span(given)
+    return int(first), int(last)
+
+
+def octets(given: object) -> bytes:
+    """Pairs of hex digits, to YAML a number if they are two decimal ones; or a number."""
+    if isinstance(given, Prefixed) or (isinstance(given, int) and not 10 <= given <= 99):
+        return bytes([given])
+    return bytes.fromhex(str(given))
+
+
+def as_doc(given: Any) -> Doc:
+    return given if isinstance(given, dict) else {"at": given}
+
+
+def part_doc(given: object) -> Doc:
+    """A part of a frame with its role; a short form becomes a mapping."""
+    if not isinstance(given, dict):
+        pairs = isinstance(given, int) or re.fullmatch("([0-9A-F]{2} ?)+", str(given))
+        given = {"value" if pairs else "type": given}
+    told = {
+        "bits": "bits",
+        "equals": "derived",
+        "const": "constant",
+        "value": "constant",
+        "text": "constant",
+        "counts": "length",
+        "algorithm": "checksum",
+    }
+    return {"role": next((role for key, role in told.items() if key in given), "value"), **given}
+
+
+def whole_or_negative(given: object) -> tuple[int, int]:
+    """A range of integers."""
+    first, last = span(given)
+    return int(first), int(last)
