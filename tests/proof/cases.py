@@ -14,6 +14,7 @@ import yaml
 
 from qlinkgen.backends import construct, python, vectors
 from qlinkgen.backends.base import Options
+from qlinkgen.model import naming
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import from_json
@@ -32,6 +33,8 @@ class Case:
 
     message: Message
     address: int
+    #: Values of the frame.
+    beside: Mapping[str, Any]
     fields: Mapping[str, Any]
     payload: bytes
     wire: bytes
@@ -118,6 +121,10 @@ def _case(described: Protocol, row: Mapping[str, Any]) -> Case:
     return Case(
         message=message,
         address=row.get(described.address_name, 0) if described.address_name else 0,
+        beside={
+            value.name: from_json(value, row[naming.record_key(value.name)])
+            for value in described.beside(message)
+        },
         fields=fields,
         payload=bytes.fromhex(row["payload"]),
         wire=bytes.fromhex(row["wire"]),

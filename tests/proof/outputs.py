@@ -7,7 +7,7 @@ import sys
 import tempfile
 import types
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from construct import ConstructError, Container, EnumInteger, EnumIntegerString
 
 from qlinkgen.backends import construct
 from qlinkgen.backends.base import Options
+from qlinkgen.model import naming
 from qlinkgen.model.frame import MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message, Value
 from qlinkgen.model.protocol import Protocol
@@ -23,6 +24,9 @@ from qlinkgen.model.types import Blob, Scalar
 from qlinkgen.model.values import default_of, native_from_raw, raw_from_native
 from tests.proof import cases
 from tests.support.cdriver import WARNINGS, Driver, raw_text
+
+Fields = Mapping[str, Any]
+NOTHING: Fields = types.MappingProxyType({})
 
 
 class Refused(Exception):
@@ -50,7 +54,7 @@ class Output(typing.Protocol):
     """One output of one protocol."""
 
     def encode(
-        self, message: Message, fields: Mapping[str, Any], address: int, request: bytes
+        self, message: Message, fields: Fields, address: int, request: bytes, beside: Fields = NOTHING
     ) -> tuple[bytes, bytes]:
         """Payload and frame, with defaults for missing values. Raises only Refused."""
         ...
@@ -82,14 +86,16 @@ class ConstructOutput:
     """Construct structures, live or from their source."""
 
     def __init__(self, protocol: Protocol, live: construct.Live) -> None:
+        self._protocol = protocol
         self._live = live
         self._address_name = protocol.address_name
 
     def encode(
-        self, message: Message, fields: Mapping[str, Any], address: int, request: bytes
+        self, message: Message, fields: Fields, address: int, request: bytes, beside: Fields = NOTHING
     ) -> tuple[bytes, bytes]:
         frame = self._live.frames[self._direction(message.direction)]
-        whole: dict[str, Any] = {"message": message.name, "fields": fields}
+        parts = {naming.record_key(name): value for name, value in beside.items()}
+        whole: dict[str, Any] = {"message": message.name, "fields": fields, **parts}
         if self._address_name:
             whole[self._address_name] = address
         try:
@@ -102,7 +108,8 @@ class ConstructOutput:
             found = self._live.parse(self._direction(message.direction), wire, request)
         except ConstructError as error:
             raise Refused(getattr(error, "kind", ""), str(error)) from None
-        fields = plain_numbers(found["fields"])
+        beside = {each.name: found[naming.record_key(each.name)] for each in self._protocol.beside(message)}
+        fields = plain_numbers({**beside, **found["fields"]})
         return Decoded(found["message"], found.get(self._address_name, 0), fields)
 
     def decode_payload(self, message: Message, payload: bytes) -> Mapping[str, Any]:
@@ -125,12 +132,12 @@ class PythonOutput:
         self._packets = isinstance(protocol.frame, PacketFrame)
 
     def encode(
-        self, message: Message, fields: Mapping[str, Any], address: int, request: bytes
+        self, message: Message, fields: Fields, address: int, request: bytes, beside: Fields = NOTHING
     ) -> tuple[bytes, bytes]:
         place = {self._protocol.address_name: address} if self._protocol.address_name else {}
         context = self._context(message.direction, request)
         try:
-            made = self._module.MESSAGES[message.name](**fields, **place)
+            made = self._module.MESSAGES[message.name](**beside, **fields, **place)
             return made.to_bytes(), made.to_frame(*context)
         except self._module.EncodeError as error:
             raise Refused("", str(error)) from None
@@ -141,7 +148,9 @@ class PythonOutput:
         except self._module.DecodeError as error:
             raise Refused(error.kind, str(error)) from None
         name = self._protocol.address_name
-        return Decoded(found.NAME, getattr(found, name) if name else 0, self._values(found))
+        beside = {each.name: getattr(found, each.name) for each in self._protocol.beside(message)}
+        fields = {**beside, **self._values(found)}
+        return Decoded(found.NAME, getattr(found, name) if name else 0, fields)
 
     def decode_payload(self, message: Message, payload: bytes) -> Mapping[str, Any]:
         try:
@@ -210,9 +219,11 @@ class COutput:
         self._packets = isinstance(protocol.frame, PacketFrame)
 
     def encode(
-        self, message: Message, fields: Mapping[str, Any], address: int, request: bytes
+        self, message: Message, fields: Fields, address: int, request: bytes, beside: Fields = NOTHING
     ) -> tuple[bytes, bytes]:
-        values = (_text(value, fields.get(value.name, default_of(value))) for value in message.values)
+        given = {**beside, **fields}
+        every = (*self._protocol.beside(message), *message.values)
+        values = (_text(value, given.get(value.name, default_of(value))) for value in every)
         place: object = address if self._protocol.address_name else "-"
         if self._packets and message.direction == "response":
             place = request.hex()
@@ -221,11 +232,12 @@ class COutput:
 
     def decode(self, message: Message, wire: bytes, request: bytes) -> Decoded:
         context = (request.hex(),) if self._packets and message.direction == "response" else ()
-        address, *values = self._ask("decode", message.name, _hex(wire), *context)
-        return Decoded(message.name, 0 if address == "-" else int(address), _natives(message, values))
+        address, *told = self._ask("decode", message.name, _hex(wire), *context)
+        every = (*self._protocol.beside(message), *message.values)
+        return Decoded(message.name, 0 if address == "-" else int(address), _natives(every, told))
 
     def decode_payload(self, message: Message, payload: bytes) -> Mapping[str, Any]:
-        return _natives(message, self._ask("payload", message.name, _hex(payload)))
+        return _natives(message.values, self._ask("payload", message.name, _hex(payload)))
 
     def stream(self, direction: str, data: bytes) -> list[str]:
         """Events of the receiver, in the words of the program."""
@@ -251,8 +263,8 @@ def _text(value: Value, native: Any) -> str:
     return raw_text(value, native.encode("ascii") if isinstance(native, str) else native)
 
 
-def _natives(message: Message, words: list[str]) -> Mapping[str, Any]:
-    return {value.name: _native(value, word) for value, word in zip(message.values, words, strict=True)}
+def _natives(values: Sequence[Value], words: list[str]) -> Fields:
+    return {value.name: _native(value, word) for value, word in zip(values, words, strict=True)}
 
 
 def _native(value: Value, word: str) -> Any:

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.ends import Rescan
 from tests.proof import cases, recovery
@@ -46,7 +47,7 @@ def python_events(name: str, direction: str, chunks: Sequence[bytes]) -> list[st
     events = [event for chunk in chunks for event in decoder.feed(chunk)]
     # In C, a receiver without look-back buffers nothing at the end of a stream.
     events += decoder.finish() if looks_back(name) else []
-    return [_shown(event, protocol.address_name) for event in events]
+    return [_shown(event, protocol) for event in events]
 
 
 def looks_back(name: str) -> bool:
@@ -54,11 +55,12 @@ def looks_back(name: str) -> bool:
     return isinstance(plan_of(cases.protocol(name)).frame.receiver, Rescan)
 
 
-def _shown(event: Any, address_name: str | None) -> str:
+def _shown(event: Any, protocol: Protocol) -> str:
     if not hasattr(event, "NAME"):
         return str(event.kind)
-    address = getattr(event, address_name) if address_name else "-"
-    return f"message:{event.NAME}:{address}:{event.to_bytes().hex() or '-'}"
+    address = getattr(event, protocol.address_name) if protocol.address_name else "-"
+    beside = [int(getattr(event, each.name)) for each in protocol.beside(protocol.by_name[event.NAME])]
+    return ":".join(["message", event.NAME, str(address), *map(str, beside), event.to_bytes().hex() or "-"])
 
 
 @st.composite

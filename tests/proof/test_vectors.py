@@ -23,7 +23,7 @@ def test_values_become_the_bytes(name: str, output: str, make: Make) -> None:
     disagreements = []
     for case in cases.cases(name):
         if not case.decode_only:
-            payload, wire = made.encode(case.message, case.fields, case.address, case.request)
+            payload, wire = made.encode(case.message, case.fields, case.address, case.request, case.beside)
             if (payload, wire) != (case.payload, case.wire):
                 disagreements.append((case.message.name, dict(case.fields), wire.hex(), case.wire.hex()))
     assert not disagreements
@@ -36,7 +36,7 @@ def test_bytes_become_the_values(name: str, output: str, make: Make) -> None:
     disagreements = []
     for case in cases.cases(name):
         found = made.decode(case.message, case.wire, case.request)
-        expected = Decoded(case.message.name, case.address, case.fields)
+        expected = Decoded(case.message.name, case.address, {**case.beside, **case.fields})
         if not same(found, expected):
             disagreements.append((found, expected, case.wire.hex()))
         if not same_values(made.decode_payload(case.message, case.payload), case.fields):
