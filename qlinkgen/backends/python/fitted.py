@@ -247,11 +247,20 @@ def _inside(nodes: list[Node], indent: int, end: str = "", *, joined: bool = Tru
         return [f"{' ' * indent}{_flat(nodes)}{end}"]
     if many:
         return [line for item in items if item for line in _inside(item, indent, ",")]
+    if any(_is(each, "lambda") for each in nodes):
+        return _function(nodes, indent, end)
     pieces = _operands(nodes)
     if len(pieces) == 1:
         return _bracketed(nodes, indent, end)
     lines = [line for piece in pieces[:-1] for line in _inside(piece, indent)]
     return [*lines, *_inside(pieces[-1], indent, end)]
+
+
+def _function(nodes: list[Node], indent: int, end: str) -> list[str]:
+    """An argument that is a function of one expression, which gets parentheses."""
+    body = next(at for at, each in enumerate(nodes) if _is(each, ":")) + 1
+    margin = " " * indent
+    return [f"{margin}{_flat(nodes[:body])} (", *_inside(nodes[body:], indent + 4), f"{margin}){end}"]
 
 
 def _items(nodes: Sequence[Node]) -> list[list[Node]]:
