@@ -193,7 +193,8 @@ class Varied(Walked):
         known = sizes if isinstance(count, SizeOf) else counts
         if isinstance(count, SizeOf):
             least = several.minimum * several.record.least
-            if not least <= number <= self.most:
+            most = min(self.most, several.maximum * several.record.most)
+            if not least <= number <= most:
                 raise RangeError(f"{number} bytes of {count.of}", path=path)
         else:
             several.checked(number, path)

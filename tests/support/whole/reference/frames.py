@@ -739,7 +739,7 @@ class _Measure:
         raw = get(slot.kind.pieces, data)
         if counted.walked and slot.counts_in == "bytes":
             self._sizes.setdefault(slot.counts, raw - slot.more)
-            if not counted.least_bytes <= raw - slot.more <= self._most:
+            if not counted.least_bytes <= raw - slot.more <= min(counted.most_bytes, self._most):
                 raise Wrong("length")
         elif slot.counts not in self._counted:
             self._counted[slot.counts] = items_of(self._slots, slot, raw)

@@ -229,6 +229,17 @@ class Slot:
         return kind.bytes_of(kind.low) if isinstance(kind, Run | Records) else size_of(kind)
 
     @property
+    def text_sizes(self) -> tuple[int, int]:
+        """Minimum and maximum number of characters of a text between separators."""
+        kind = self.kind
+        if isinstance(kind, Run):
+            return kind.low, kind.most
+        assert isinstance(kind, Number)
+        assert kind.text
+        _, least, most, _, _ = kind.text
+        return least if least == most else 1, most
+
+    @property
     def most_bytes(self) -> int:
         """Maximum size on the wire; 0 for a run without a bound."""
         kind = self.kind
@@ -328,6 +339,11 @@ class Message:
     @property
     def sizes(self) -> tuple[int, int]:
         """Minimum and maximum size of the payload."""
+        if self.separator:  # absent texts at the end are left out with the separators before them
+            sizes = [slot.text_sizes for slot in self.slots]
+            needed = max((at for at, slot in enumerate(self.slots) if not slot.optional), default=0)
+            texts = (low for (low, _), slot in zip(sizes, self.slots, strict=True) if not slot.optional)
+            return sum(texts) + needed, sum(high for _, high in sizes) + len(sizes) - 1
         always = [slot for slot in self.slots if not slot.conditional]
         most = most_bytes(self.slots)
         if self.limit is not None and any(slot.walked for slot in self.slots):

@@ -116,13 +116,7 @@ def _between(message: Message, payload: bytes) -> dict[str, Raw]:
         if slot.optional and not text:
             values[slot.name] = None
             continue
-        if isinstance(kind, Run):
-            least, most = kind.low, kind.most
-        else:
-            assert isinstance(kind, Number)
-            assert kind.text
-            _, least, most, _, _ = kind.text
-            least = least if least == most else 1
+        least, most = slot.text_sizes
         if not least <= len(text) <= most:
             raise Wrong("length", slot.name)
         values |= _decoded(slot, text, len(text))
@@ -369,7 +363,8 @@ class _Walk:
         assert isinstance(slot.kind, Number)
         assert isinstance(counted.kind, Records)
         size = get(slot.kind.pieces, data) - slot.more
-        if not counted.least_bytes <= size <= self._most or size != self._sizes.setdefault(slot.counts, size):
+        most = min(counted.most_bytes, self._most)
+        if not counted.least_bytes <= size <= most or size != self._sizes.setdefault(slot.counts, size):
             raise Wrong("length", f"size {size}")
 
     def _records(self, slot: Slot, at: int, end: int) -> tuple[Raw, int]:
