@@ -69,10 +69,10 @@ def read(wire: bytes, direction: Direction) -> Record | None:
     board, line = _board(), io.BytesIO(wire)
     board.conn = SimpleNamespace(read=lambda size=1: line.read(size))
     found = board.receive_msg()
+    if found["unsupported"]:  # it reads no further
+        return {"refused": True}
     assert not found.get("packet_error")
     name = next(name for name, code in _CODES.items() if code == found["code"])
-    if found["unsupported"]:
-        return {"message": f"{name}.unsupported", "refused": True, "fields": {}}
     fields: Mapping[str, Any] = {}
     if direction == "response" and name in _VALUES and found["dataView"]:
         assert board.process_recv_data(found) >= 0  # bytes that it leaves
