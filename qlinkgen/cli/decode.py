@@ -26,9 +26,11 @@ from qlinkgen.model.naming import address_attribute, attribute, record_key
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Means, Reply
 from qlinkgen.model.values import Json, to_json
+from qlinkgen.plan.ends import BySilence
 from qlinkgen.plan.framing import frame_plan
 
 CHUNK = 65536
+_LINE = re.compile(rb"[^\n]*\n|[^\n]+")
 _COMMENT = re.compile(rb"#[^\n]*")
 
 
@@ -64,6 +66,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     has that direction; one that is valid in both is the response if it directly follows a request of the same
     command and node, else the request. Packets without --direction are a conversation: after a request, a
     response if its check value fits, else the next request; with --direction response they need --request.
+    Where only a silence ends a frame, each line of standard input is one frame, and so are all HEX together.
 
     \b
     qlinkgen decode qlink a5a504210315e8
@@ -75,9 +78,16 @@ def command(  # noqa: PLR0917  # click passes them by name
     loaded = load_protocol(protocol, crc, version)
     codec = load_codec(loaded)
     stream = _stream(loaded, codec, direction, request)
+    gaps = isinstance(frame_plan(loaded.frame).end, BySilence)
+    if gaps and raw:
+        what = f"only a silence ends a frame of {loaded.name}, and raw bytes have no times"
+        raise Failure(f"{what}; give hex text with one frame on each line")
     printer = _Printer(loaded)
     for chunk in chunks:
-        printer.show(stream.feed(chunk), len(chunk))
+        if chunk is not None:
+            printer.show(stream.feed(chunk), len(chunk))
+        elif gaps:
+            printer.show(stream.finish())
     printer.show(stream.finish())
     return printer.result()
 
@@ -99,7 +109,8 @@ def _stream(
     return Answers(protocol, codec, asked(protocol, codec, request))
 
 
-def _input(words: tuple[str, ...], *, raw: bool) -> Iterable[bytes]:
+def _input(words: tuple[str, ...], *, raw: bool) -> Iterable[bytes | None]:
+    """The bytes, and None after each line of hex text."""
     if words and words != ("-",):
         if raw:
             raise Failure("--raw reads bytes from standard input; omit HEX or --raw")
@@ -114,8 +125,8 @@ def _read_raw() -> Iterator[bytes]:
         yield chunk
 
 
-def _read_hex() -> Iterator[bytes]:
-    """Yield bytes as soon as both digits are known; a chunk may end anywhere.
+def _read_hex() -> Iterator[bytes | None]:
+    """Yield bytes as soon as both digits are known, and None after each line; a chunk may end anywhere.
 
     The bytes before a wrong character are yielded before the error is raised.
     """
@@ -123,13 +134,16 @@ def _read_hex() -> Iterator[bytes]:
     for chunk in chain(_read_raw(), (b"\n",)):
         text = _COMMENT.sub(b"", b"#" + chunk if comment else chunk)
         comment = b"#" in chunk[chunk.rfind(b"\n") + 1 :] or (comment and b"\n" not in chunk)
-        try:
-            yield reader.feed(text.decode("ascii", "surrogateescape"))
-        except HexError as error:
-            yield error.before
-            at = line + text.count(b"\n", 0, error.at)
-            raise Failure(f"standard input, line {at}: {error.message}; comments begin with #") from None
-        line += chunk.count(b"\n")
+        for piece in _LINE.findall(text):
+            try:
+                yield reader.feed(piece.decode("ascii", "surrogateescape"))
+            except HexError as error:
+                yield error.before
+                what = f"standard input, line {line}: {error.message}"
+                raise Failure(f"{what}; comments begin with #") from None
+            if piece.endswith(b"\n"):
+                line += 1
+                yield None
 
 
 class _Printer:

@@ -12,7 +12,7 @@ from qlinkgen._resources import schemas_dir
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import find_schema
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.plan.ends import Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.framing import frame_plan
 
 
@@ -56,7 +56,7 @@ def kind_of(protocol: Protocol) -> Kind:
             return HOST
         case "ring", Marks():
             return RING
-        case "master_slave" | "link", Hunt() | Rescan() | Marks():
+        case "master_slave" | "link", Hunt() | Rescan() | Marks() | Gaps():
             return BUS
     raise Failure(
         f"{protocol.name}: frames of this kind on a bus of kind {protocol.bus.kind} can be encoded and "

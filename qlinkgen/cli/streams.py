@@ -18,7 +18,7 @@ from qlinkgen.cli.codec import MessageObject
 from qlinkgen.link.codec import Fault, Framed, Message, address_of, is_message
 from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol as Described
-from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, ByTerminator
+from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator
 from qlinkgen.plan.framing import FramePlan, frame_plan
 
 #: Kinds of faults in the order of the checks: of two faults, the later one is reported.
@@ -236,7 +236,7 @@ def _ends_alike(frame: FramePlan) -> bool:
             return all(map(_ends_alike, frame.kinds))
         case ByLength() | ByTerminator():
             return bool(frame.envelope.preamble)
-        case ByMark():
+        case ByMark() | BySilence():
             return True
         case ByMessage():
             return False

@@ -53,6 +53,7 @@ from qlinkgen.link.events import (
     Stray,
     TimedOut,
 )
+from qlinkgen.link.gaps import Gap
 from qlinkgen.link.health import HealthBook, HealthPolicy
 from qlinkgen.link.many import Answers
 from qlinkgen.link.master_states import MASTER_MOVES, MasterEvent, MasterState
@@ -123,6 +124,7 @@ class MasterEngine:
         self._probe = EchoProbe()
         self._broken_echo = EchoBroken(0.0, None, b"", b"")
         self._line = QuietLine(timing.quiet, timing.quiet_limit)
+        self._gap = Gap(timing.silence)
         self._attempts = Attempts()
         self._state = MasterState.IDLE
         self._outcome: Reply | LinkError | None = None
@@ -247,15 +249,23 @@ class MasterEngine:
             data = self._without_echo(data, now)
             if not data:
                 return
+        if self._gap.passed(now):
+            self._end_frame(now)
         self._received = data
         for event in self._decoder.feed(data):
+            self._take_in(event, now)
+        self._gap.heard(now)
+
+    def _end_frame(self, now: float) -> None:
+        """The line was idle, or a request follows: bytes inside a damaged frame may be a message."""
+        for event in self._decoder.finish():
             self._take_in(event, now)
 
     def next_timer(self) -> float | None:
         """Return the time of the next call without received bytes; None if none is needed."""
         state = self._state
         if state is WAITING:
-            return self._deadline
+            return self._gap.before(self._deadline)
         if state is IDLE:
             return None
         if state is PROBING and self._probe.until:
@@ -264,6 +274,8 @@ class MasterEngine:
 
     def handle_timer(self, now: float) -> None:
         """Process expired timers."""
+        if self._gap.passed(now):
+            self._end_frame(now)
         state = self._state
         if state is WAITING:
             if now >= self._deadline:
@@ -308,8 +320,8 @@ class MasterEngine:
         return self._probe.send(now + self.timing.on_wire(len(PROBE)) + self._line.quiet)
 
     def _send(self, now: float) -> bytes:
-        for event in self._decoder.finish():  # bytes inside a damaged frame may be a message
-            self._take_in(event, now)
+        self._end_frame(now)
+        self._gap.due = None
         pending, attempts = self._pending, self._attempts
         if attempts.number and self._numbering is not None and self._numbering.per_frame:
             self._numbering.number(pending.request)
@@ -328,7 +340,7 @@ class MasterEngine:
             self.events.append(Sent(now, pending.node, pending.request, number, frame))
         on_wire = len(frame) * self._byte_time
         if not pending.is_answered:
-            if self._paced:
+            if self._paced or self._gap.span:
                 self._line.free_at = now + on_wire + command.allowance
             self._outcome = attempts.reply(None, now)
             self._state = _UNANSWERED[self._state]
@@ -373,7 +385,7 @@ class MasterEngine:
             self._deadline = now + on_wire + command.step_times[dialogue.at]
             self._state = (_MORE if self._state is WAITING else _SENT)[self._state]
             return
-        if on_wire and self._paced:
+        if on_wire and (self._paced or self._gap.span):
             self._line.free_at = now + on_wire + command.allowance
         if dialogue.ended:
             self._outcome = self._attempts.reply(tuple(dialogue.answers), now)

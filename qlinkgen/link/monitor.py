@@ -28,6 +28,7 @@ from qlinkgen.link.codec import (
 )
 from qlinkgen.link.dialogue import Progress
 from qlinkgen.link.events import Damaged, Stray
+from qlinkgen.link.gaps import Gap
 from qlinkgen.link.many import Answers
 from qlinkgen.link.timing import Timing
 from qlinkgen.link.transaction import Accepts
@@ -139,6 +140,7 @@ class Monitor:
         self._suspected: dict[int, Fault] = {}
         self._pending: _Pending | None = None
         self._answer_to = answer_to(codec)
+        self._gap = Gap(timing.silence)
 
     @property
     def skipped(self) -> int:
@@ -156,21 +158,25 @@ class Monitor:
             answering = self._responses.feed(piece)
             if asking or answering:
                 self._sort(asking, answering, now)
+        self._gap.heard(now)
 
     def finish(self, now: float) -> None:
         """End the stream."""
         self._sort(self._requests.finish(), self._responses.finish(), now)
+        self._gap.due = None
         if self._pending is not None:
             self._pending.deadline = min(self._pending.deadline, now)
             self.handle_timer(now)
 
     def next_timer(self) -> float | None:
-        """Return the deadline of the pending request, None without one."""
+        """Return the deadline of the pending request, or the end of a silence; None without either."""
         pending = self._pending
-        return None if pending is None or pending.reported else pending.deadline
+        return self._gap.before(None if pending is None or pending.reported else pending.deadline)
 
     def handle_timer(self, now: float) -> None:
-        """Report a request that was not answered in time."""
+        """End a frame after a silence that alone does; report a request that was not answered in time."""
+        if self._gap.passed(now):
+            self._sort(self._requests.finish(), self._responses.finish(), now)
         pending = self._pending
         if pending is not None and not pending.reported and now >= pending.deadline:
             pending.reported = True

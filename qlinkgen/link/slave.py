@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from typing import Any, Literal, Protocol
 
-from qlinkgen.link.codec import Codec, Framed, Message, address_of, is_message, wrong_size
+from qlinkgen.link.codec import Codec, Fault, Framed, Message, address_of, is_message, wrong_size
 from qlinkgen.link.echo import EchoCanceller
+from qlinkgen.link.gaps import Gap, silence_of
 from qlinkgen.link.numbering import numbering_of
 from qlinkgen.link.slave_dialogue import PENDING, Answers, Handling, Refusal, SlaveDialogue
 from qlinkgen.link.unknown import unknown_requests
@@ -81,6 +82,7 @@ class SlaveEngine:
         turnaround: float = 0.0,
         baud: int | None = None,
         echo: Literal["expect", "none"] = "none",
+        host_slack: float = 0.0,
     ) -> None:
         """Make the engine of one node.
 
@@ -94,6 +96,8 @@ class SlaveEngine:
             baud: speed of the line, by default that of the schema.
             echo: whether the adapter echoes sent bytes. An answer can be the same bytes as its request, so
                 with an unexpected echo the node would answer itself endlessly.
+            host_slack: largest delay with which bytes of one frame arrive; where only a silence ends a
+                frame, the node waits for it that much longer.
         """
         if echo not in ("expect", "none"):
             raise ValueError(
@@ -122,6 +126,8 @@ class SlaveEngine:
         speed = baud or codec.BUS.baud
         self._byte_time = codec.BUS.bits_per_byte / speed if speed else 0.0
         self._unknown = unknown_requests(codec, self._byte_time)
+        idle = silence_of(codec, self._byte_time)
+        self._gap = Gap(idle + host_slack if idle else 0.0)
         self._echo = EchoCanceller(echo)
         self._last = b""
         self._answer = b""
@@ -136,7 +142,14 @@ class SlaveEngine:
         self._last = data[-1:]
         if self._unknown is not None and data:
             self._unknown.received(data, now)
-        for event in self._decoder.feed(data):
+        if self._gap.passed(now):
+            self._sort(self._decoder.finish(), now)
+        self._sort(self._decoder.feed(data), now)
+        if data:
+            self._gap.heard(now)
+
+    def _sort(self, events: Sequence[Framed | Fault], now: float) -> None:
+        for event in events:
             if is_message(event):
                 self._heard(event, now)
             else:
@@ -274,13 +287,16 @@ class SlaveEngine:
 
     def bytes_to_send(self, now: float) -> bytes:
         """Return the answer if it is due."""
+        if self._gap.passed(now):
+            self._sort(self._decoder.finish(), now)
         if self._unknown is not None and self._unknown.due is not None and now >= self._unknown.due:
             self._refuse(self._unknown.silent(self._node), now)
         answer = self._answer
         if not answer or now < self._due:
             return b""
         self._answer = self._further.pop(0) if self._further else b""
-        self._due = now + len(answer) * self._byte_time + self._turnaround
+        pause = max(self._turnaround, self._gap.span)
+        self._due = now + len(answer) * self._byte_time + pause
         self.counters.answers += 1
         if self._echo.mode == "expect":
             self._echo.sent(answer)
@@ -288,7 +304,7 @@ class SlaveEngine:
 
     def next_timer(self) -> float | None:
         """Return when an answer is due, or the line has been idle where that matters; None otherwise."""
-        silence = None if self._unknown is None else self._unknown.due
+        silence = self._gap.before(None if self._unknown is None else self._unknown.due)
         if not self._answer:
             return silence
         return self._due if silence is None else min(self._due, silence)

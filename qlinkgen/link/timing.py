@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 from qlinkgen.link.codec import Command, Framed, Many, Module, OtherReply, StepSpan, meanings
 from qlinkgen.link.echo import PROBE
+from qlinkgen.link.gaps import silence_of
 
 #: Byte times after which a line counts as quiet; also Q.link's response time.
 QUIET_BYTES = 3
@@ -34,6 +35,8 @@ class Timing:
         paced: bytes are transmitted at the baud rate; not so on a pty, where they arrive at once.
         attempts: number of transmissions of a request that may be repeated.
         longest_allowance: longest allowance of any command of the protocol.
+        silence: wait for the idle line that ends a frame, delays of the host included; 0 if frames end
+            otherwise.
     """
 
     baud: int
@@ -43,6 +46,7 @@ class Timing:
     paced: bool = True
     attempts: int = 3
     longest_allowance: float = 0.0
+    silence: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
@@ -71,7 +75,9 @@ class Timing:
             raise ValueError("the schema has no commands, so it has no deadlines")
         longest = max(*map(_longest_request, commands), *map(_longest_answer, commands))
         plain = cls(speed, codec.BUS.bits_per_byte, host_slack, longest, paced, attempts)
-        return replace(plain, longest_allowance=max(map(plain.allowance, commands)))
+        idle = silence_of(codec, plain.byte_time)
+        silence = idle + host_slack if idle else 0.0
+        return replace(plain, longest_allowance=max(map(plain.allowance, commands)), silence=silence)
 
     @property
     def byte_time(self) -> float:
@@ -95,14 +101,15 @@ class Timing:
             return 0.0
         sent = command.request.MAX_WIRE_SIZE if request_size is None else request_size
         size = sent + _longest_answer(command)
-        return self.on_wire(size) + self.allowance(command) + self.host_slack
+        return self.on_wire(size) + self.allowance(command) + self.host_slack + self.silence
 
     def patience(self, command: Command, reply: OtherReply) -> float:
         """Return the time from a pending reply to the answer."""
         if reply.within is None or command.response is None:
             return self.deadline(command, 0)
         byte_times, seconds = reply.within
-        return self.on_wire(_longest_answer(command)) + self._time(byte_times, seconds) + self.host_slack
+        allowance = self._time(byte_times, seconds) + self.host_slack + self.silence
+        return self.on_wire(_longest_answer(command)) + allowance
 
     def duration(self, many: Many) -> float:
         """Return the time in which several answers come, if that is their end."""
@@ -111,7 +118,8 @@ class Timing:
     def step(self, step: tuple[str, type[Framed], StepSpan | None]) -> float:
         """Return the time until a frame of a dialogue is complete, after the one before it."""
         _, message, within = step
-        return self.on_wire(message.MAX_WIRE_SIZE) + self._time(*within or (0.0, 0.0)) + self.host_slack
+        allowance = self._time(*within or (0.0, 0.0)) + self.host_slack + self.silence
+        return self.on_wire(message.MAX_WIRE_SIZE) + allowance
 
     def pause(self, reply: OtherReply) -> float:
         """Return the time until a request is sent again, if a reply asks for it."""
@@ -132,7 +140,7 @@ class Timing:
 
     def gap(self, command: Command) -> float:
         """Return the pause for slaves after a request without a response."""
-        return self.allowance(command)
+        return max(self.allowance(command), self.silence)
 
     def attempts_of(self, command: Command, attempts: int | None = None) -> int:
         """Return the largest number of transmissions of a request: 1 if it is unsafe to repeat."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from qlinkgen.link.codec import Codec, Framed
+from qlinkgen.link.gaps import silence_of
 
 #: The answer to the bytes of a request to a node, of `answer_unknown` of a generated module.
 AnswerUnknown = Callable[[bytes, int | None], Framed | None]
@@ -23,6 +24,8 @@ class UnknownRequests:
         """``answer`` is that of the codec."""
         self._answer = answer
         silence: tuple[float, float] | None = getattr(codec, "IDLE", None)
+        if silence_of(codec, byte_time):  # then a fault has the bytes of the whole request
+            silence = None
         self._silence = max(silence[0] * byte_time, silence[1]) if silence else None
         self._pieces: list[bytes] = []
         #: When the line has been idle, None if nothing was received since.

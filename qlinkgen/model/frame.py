@@ -194,15 +194,19 @@ class Stuffing:
 
 @dataclass(frozen=True, slots=True)
 class Silence:
-    """An idle line that ends a frame early: ``byte_times`` on the bus, but at least ``seconds``."""
+    """An idle line that ends a frame: ``byte_times`` on the bus, but at least ``seconds``.
+
+    If ``alone``, nothing else does; otherwise it ends a frame early.
+    """
 
     byte_times: Fraction
     seconds: Fraction
+    alone: bool = False
 
 
 @dataclass(frozen=True)
 class DelimitedFrame:
-    """Parts in wire order; a terminator, otherwise a length, otherwise the message determines the end.
+    """Parts in wire order; a terminator, an idle line alone, a length or the message determines the end.
 
     ``coding`` applies to the parts named in ``coded``, one coding after the other.
     """
@@ -238,6 +242,16 @@ class DelimitedFrame:
     def part(self, role: Role) -> Part | None:
         """The first part with a role."""
         return next((part for part in self.parts if part.role == role), None)
+
+    @property
+    def ends_idle(self) -> bool:
+        """Whether nothing but an idle line ends a frame."""
+        return self.idle is not None and self.idle.alone
+
+    @property
+    def tells_end(self) -> bool:
+        """Whether something other than the message tells the end of a frame."""
+        return self.ends_idle or self.part("length") is not None or self.part("terminator") is not None
 
     @cached_property
     def paired(self) -> int | None:

@@ -40,7 +40,7 @@ from qlinkgen.model.message import Direction
 from qlinkgen.plan import content
 from qlinkgen.plan.content import BadContent, Raw, Unsendable
 from qlinkgen.plan.ended import frame_reader
-from qlinkgen.plan.ends import Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
@@ -225,7 +225,7 @@ class Codec:
                 return self._packet(wire, direction, request)
             case Marks():
                 return self.judge(read_marked(frame, known, wire), direction)
-            case Hunt() | Rescan():
+            case Hunt() | Rescan() | Gaps():
                 hunting = isinstance(frame.receiver, Hunt)
                 taken = frame_reader(frame, known).read(wire, hunting=hunting)
                 if wire[taken.end :] not in (b"", taken.due):

@@ -24,7 +24,19 @@ from qlinkgen.model.types import (
 from qlinkgen.model.values import native_from_raw
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
-from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import (
+    ByKind,
+    ByLength,
+    ByMark,
+    ByMessage,
+    BySilence,
+    ByTerminator,
+    Gaps,
+    Hunt,
+    InStep,
+    Marks,
+    Rescan,
+)
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
@@ -419,7 +431,7 @@ def id_text(frame: FramePlan, number: int) -> str:
     match end:
         case ByMark():
             return str(number)
-        case ByLength() | ByMessage() | ByTerminator():
+        case ByLength() | ByMessage() | ByTerminator() | BySilence():
             return f"0x{number:02X}"
         case ByKind():
             base = max(each.base for each in frame.kinds if each.base <= number)
@@ -432,7 +444,8 @@ def id_text(frame: FramePlan, number: int) -> str:
 
 def end_text(frame: FramePlan) -> str:
     """The rule that determines the end of a frame."""
-    return _end_text(frame) + (f"; {idle_text(frame.idle)} ends it early" if frame.idle else "")
+    early = frame.idle is not None and not frame.idle.alone
+    return _end_text(frame) + (f"; {idle_text(frame.idle)} ends it early" if frame.idle and early else "")
 
 
 def idle_text(silence: Silence) -> str:
@@ -456,6 +469,9 @@ def _end_text(frame: FramePlan) -> str:
             begins = ", which may also begin the next frame" if end.shared else ""
             after = f"; {end.after} bytes follow" if end.after else ""
             return f"the next {end.part.data.hex(' ').upper()}{begins}{after}"
+        case BySilence():
+            assert frame.idle is not None
+            return f"{idle_text(frame.idle)} alone"
         case ByMark():
             return f"the next byte with bit 0x{end.header.marker:02X} set"
         case ByKind():
@@ -541,6 +557,8 @@ def receiver_text(frame: FramePlan) -> tuple[str, str]:
             return "marks", "header and end have a marker bit that all other bytes lack"
         case InStep():
             return "in step", "packets have no delimiter, so both sides must stay in step"
+        case Gaps():
+            return "gaps", "what lies between two silences is a frame, or one fault"
         case _:
             assert_never(way)
 

@@ -16,7 +16,7 @@ from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.content import BadContent, MoreNeeded, broken, measure
-from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, ByTerminator, Hunt
+from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator, Hunt
 from qlinkgen.plan.fields import Fields
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
@@ -52,7 +52,7 @@ def dissect(plan: Plan, wire: bytes, direction: Direction, request: bytes = b"")
         kind = bad.kind
     else:
         kind = ""
-    walk = _EndedWalk if isinstance(plan.frame.end, ByTerminator) else _Walk
+    walk = _EndedWalk if plan.frame.whole else _Walk
     return walk(codec, wire, direction, request, kind).run()
 
 
@@ -240,7 +240,7 @@ class _Walk:
                     return
             case ByMark():
                 size = self._marked_size(end)
-            case ByTerminator() | ByKind():
+            case ByTerminator() | BySilence() | ByKind():
                 raise AssertionError("the terminator or the kind is found first")
             case ByMessage() if self.frame.needs_request:
                 payload = self.message.payload if self.message else None
@@ -616,25 +616,35 @@ class _Walk:
 
 
 class _EndedWalk(_Walk):
-    """Divides a frame that a terminator ends: decodes it as a whole, then takes its parts from both ends."""
+    """Divides a frame that a terminator or a silence ends.
+
+    It is decoded as a whole, then its parts are taken from both ends.
+    """
 
     def _divide(self, front: Sequence[Part]) -> None:
         del front
-        assert isinstance(self.frame.end, ByTerminator)
-        last, wire, start = self.frame.end.part, self.wire, self.cursor.at
+        last, wire, start = self.frame.end, self.wire, self.cursor.at
         size = 0 if self.no_preamble else len(self.envelope.preamble)
         first = min(start + size, len(wire))
-        stop = self.frame.end.find(wire, first, len(wire))
-        end = len(wire) if stop < 0 else min(len(wire), stop + last.size + self.frame.end.after)
+        stop = last.find(wire, first, len(wire)) if isinstance(last, ByTerminator) else len(wire)
+        end = len(wire) if stop < 0 else min(len(wire), stop + self.closing)
         content = self._as_sent(start, first) + self._decoded(first, len(wire) if stop < 0 else stop)
         self.cursor.at = end
         self._allot(content, self._as_sent(stop, end) if stop >= 0 else None)
         self._identify()
         if self.message is not None:
             self.envelope = self.message.envelope
-        limit = start + self.frame.max_wire - self.frame.end.after
-        if self.kind == "length" and not 0 <= stop <= limit - last.size:
-            self._fault("length", Rule.TERMINATOR, len(wire), last)
+        limit = start + self.frame.max_wire - self.closing
+        if isinstance(last, ByTerminator) and self.kind == "length" and not 0 <= stop <= limit:
+            self._fault("length", Rule.TERMINATOR, len(wire), last.part)
+        elif isinstance(last, BySilence) and len(wire) > limit:
+            self._fault("length", Rule.LAST, limit, seen=len(wire) - limit)
+
+    @property
+    def closing(self) -> int:
+        """Size of the terminator and what follows it."""
+        end = self.frame.end
+        return end.part.size + end.after if isinstance(end, ByTerminator) else 0
 
     def _as_sent(self, first: int, end: int) -> list[tuple[int, int]]:
         """Offset and value of bytes that are not coded."""
@@ -642,11 +652,10 @@ class _EndedWalk(_Walk):
 
     def _decoded(self, first: int, stop: int) -> list[tuple[int, int]]:
         """Offset and value of each byte from the first constant to the terminator."""
-        coded, last = self.frame.transparency, self.frame.end
+        coded = self.frame.transparency
         assert isinstance(coded, Coded)
-        assert isinstance(last, ByTerminator)
         inner = min(stop, first + coded.front - len(self.envelope.preamble))
-        end = max(inner, stop - (coded.back - last.part.size - last.after))
+        end = max(inner, stop - (coded.back - self.closing))
         read, before, found = coded.read(self.wire[inner:end]), inner, self._as_sent(first, inner)
         for byte, place in zip(read.plain, read.places, strict=True):
             found.append((before, byte))
@@ -663,9 +672,9 @@ class _EndedWalk(_Walk):
 
     def _allot(self, content: Sequence[tuple[int, int]], closing: Sequence[tuple[int, int]] | None) -> None:
         """Give each part its bytes; ``closing`` is the terminator and what follows it, None without one."""
-        assert isinstance(self.frame.end, ByTerminator)
+        end, payload = self.frame.end, self.envelope.payload
         parts = [part for part in self.envelope.parts if part.name not in self.cells]
-        last, payload = parts.index(self.frame.end.part), self.envelope.payload
+        last = parts.index(end.part) if isinstance(end, ByTerminator) else len(parts)
         before = parts[:last] if closing is not None else parts[: parts.index(payload)]
         fixed = sum(part.size for part in before)
         size = max(0, len(content) - fixed)

@@ -1,11 +1,11 @@
-"""Reads frames that a terminator ends: first its bytes as a whole, then its parts from both ends."""
+"""Reads frames that a terminator or a silence ends: decodes all bytes, then takes parts from both ends."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from qlinkgen.plan.ends import ByTerminator
+from qlinkgen.plan.ends import BySilence, ByTerminator
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import LengthPart, PayloadPart
@@ -56,14 +56,28 @@ def find_end(frame: FramePlan, wire: bytes, start: int = 0) -> int:
 
 def read_whole(frame: FramePlan, wire: bytes, start: int = 0) -> Whole:
     """The frame at ``start``, decoded. Raises as `find_end`."""
-    assert isinstance(frame.end, ByTerminator)
     assert isinstance(frame.transparency, Coded)
+    if isinstance(frame.end, BySilence):
+        return decoded(frame, wire, start, _silent_end(frame, wire, start))
+    assert isinstance(frame.end, ByTerminator)
     stop = find_end(frame, wire, start)
     rest = frame.end.part.size + frame.end.after
     end = stop + rest
     if len(wire) < end:
         raise Incomplete(end)
     return decoded(frame, wire, start, end)
+
+
+def _silent_end(frame: FramePlan, wire: bytes, start: int) -> int:
+    """The wire offset of the end of the bytes between two silences. Raises BadFrame."""
+    lead = frame.envelope.preamble
+    head = wire[start : start + len(lead)]
+    if head != lead:
+        seen = next((at for at in range(len(head)) if head[at] != lead[at]), len(head))
+        raise BadFrame("frame" if seen < len(head) else "length", start + seen)
+    if len(wire) - start > frame.max_wire:
+        raise BadFrame("length", start + frame.max_wire)
+    return len(wire)
 
 
 def decoded(frame: FramePlan, wire: bytes, start: int, end: int) -> Whole:
@@ -93,7 +107,7 @@ def cells_of(envelope: Envelope, plain: bytes) -> Mapping[str, bytes] | None:
 
 
 class EndedReader(FrameReader):
-    """Reads frames that a terminator ends."""
+    """Reads frames that a terminator or a silence ends."""
 
     def read(self, wire: bytes, start: int = 0, *, hunting: bool = False) -> Taken:
         """The frame that begins at ``start``; see `FrameReader.read`."""
@@ -130,5 +144,5 @@ def frame_reader(plan: FramePlan, known: Mapping[int, MessagePlan]) -> FrameRead
     """The reader of frames of parts; ``known`` are the messages of their direction, by number."""
     if plan.kinds:
         return KindsReader(plan, known)
-    kind = EndedReader if isinstance(plan.end, ByTerminator) else FrameReader
+    kind = EndedReader if plan.whole else FrameReader
     return kind(plan, known)

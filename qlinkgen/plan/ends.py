@@ -53,11 +53,16 @@ class ByTerminator:
 
 
 @dataclass(frozen=True, slots=True)
+class BySilence:
+    """Only an idle line ends a frame."""
+
+
+@dataclass(frozen=True, slots=True)
 class ByKind:
     """Each kind of frame has an end of its own."""
 
 
-End = ByLength | ByMessage | ByMark | ByTerminator | ByKind
+End = ByLength | ByMessage | ByMark | ByTerminator | BySilence | ByKind
 
 
 # How a receiver finds frames
@@ -106,4 +111,9 @@ class InStep:
     """Frames have no delimiter: both sides must stay in step."""
 
 
-Receiver = Hunt | Rescan | Marks | InStep
+@dataclass(frozen=True, slots=True)
+class Gaps:
+    """The bytes between two silences are a frame, or none begins in them."""
+
+
+Receiver = Hunt | Rescan | Marks | InStep | Gaps

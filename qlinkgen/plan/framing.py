@@ -30,8 +30,10 @@ from qlinkgen.plan.ends import (
     ByLength,
     ByMark,
     ByMessage,
+    BySilence,
     ByTerminator,
     End,
+    Gaps,
     Hunt,
     InStep,
     Marks,
@@ -78,7 +80,7 @@ class FramePlan:
         receiver: how frames are found in a stream.
         address: name of the address, "" if there is none.
         id_name: name of the message number.
-        idle: silence on the line that ends a frame early, None if the document states none.
+        idle: silence on the line that ends a frame, None if the document states none.
         kinds: the kinds of frame, () if there is one; each with its own ``envelope``.
         name: name of the kind, "" if there is one.
         base: what is added to the number of a message in frames of this kind.
@@ -124,6 +126,11 @@ class FramePlan:
         return part.check if part else None
 
     @property
+    def whole(self) -> bool:
+        """Whether the end of a frame is found before anything in it is read."""
+        return isinstance(self.end, ByTerminator | BySilence)
+
+    @property
     def needs_request(self) -> bool:
         """Whether a response can be decoded only with its request."""
         return isinstance(self.receiver, InStep)
@@ -162,7 +169,7 @@ class FramePlan:
         """Number of bytes after which a receiver reports bytes outside of frames."""
         if self.kinds:
             return self.max_wire
-        return self.max_wire if isinstance(self.end, ByTerminator) else self.envelope.max_frame
+        return self.max_wire if self.whole else self.envelope.max_frame
 
     @property
     def flag(self) -> bytes:
@@ -249,11 +256,13 @@ def _delimited(whole: DelimitedFrame, direction: Direction) -> FramePlan:
         part = next(each for each in envelope.parts if each.name == stated.name)
         assert isinstance(part, ConstantPart)
         end = ByTerminator(part, envelope.from_end(part) - part.size, stated.shared, frame.paired)
+    if frame.ends_idle:
+        end = BySilence()
     return FramePlan(
         envelope=envelope,
         end=end,
         transparency=transparency,
-        receiver=_receiver(envelope, transparency, directed=whole.directed),
+        receiver=Gaps() if frame.ends_idle else _receiver(envelope, transparency, directed=whole.directed),
         address=address.name if address else "",
         id_name=frame.id_bits[-1].name if frame.id_bits else "",
         idle=frame.idle,
@@ -262,7 +271,7 @@ def _delimited(whole: DelimitedFrame, direction: Direction) -> FramePlan:
 
 def _transparency(frame: DelimitedFrame) -> Transparency:
     stuffing = frame.stuffing
-    if frame.part("terminator"):
+    if frame.part("terminator") or frame.ends_idle:
         return _coded(frame)
     if stuffing is None:
         return Plain()
@@ -276,12 +285,13 @@ def _transparency(frame: DelimitedFrame) -> Transparency:
 
 
 def _coded(frame: DelimitedFrame) -> Coded:
-    """The coding of a frame with a terminator; without one, all before that is sent as it is."""
+    """The coding of a frame whose end is found first; without one, all before that is sent as it is."""
     names = [part.name for part in frame.parts]
     coded = [index for index, name in enumerate(names) if name in frame.coded]
     if not coded:
         roles = [part.role for part in frame.parts]
-        coded = [int(roles[0] == "constant"), roles.index("terminator") - 1]
+        end = roles.index("terminator") if "terminator" in roles else len(roles)
+        coded = [int(roles[0] == "constant"), end - 1]
     front, back = frame.parts[: coded[0]], frame.parts[coded[-1] + 1 :]
     stages = tuple(map(stage, frame.coding))
     return Coded(stages, sum(part.size for part in front), sum(part.size for part in back))

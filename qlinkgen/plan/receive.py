@@ -14,7 +14,7 @@ from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec, Decoded, take_packet
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure
 from qlinkgen.plan.ended import frame_reader
-from qlinkgen.plan.ends import ByMark, ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import ByMark, ByTerminator, Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.reading import BadFrame, FrameReader, Incomplete, NoFrame, Taken, take_marked
 from qlinkgen.plan.tree import Plan
 
@@ -110,6 +110,8 @@ def receiver(plan: Plan, direction: Direction) -> Receiver:
             return MarkReceiver(plan, direction)
         case InStep():
             return PacketReceiver(plan, direction)
+        case Gaps():
+            return GapReceiver(plan, direction)
         case _:
             assert_never(strategy)
 
@@ -279,6 +281,39 @@ class RescanningReceiver(Receiver):
         yield from self._scan()
         yield from self._report(self.taken)
         self._buffer, self._due, self._incomplete, self._lost = b"", b"", Incomplete(), False
+
+
+class GapReceiver(Receiver):
+    """What lies between two silences is a frame, or one fault."""
+
+    def __init__(self, plan: Plan, direction: Direction) -> None:
+        """Begin after a silence."""
+        super().__init__(plan, direction)
+        self._reader = frame_reader(self.frame, self.known)
+        self._raw = b""
+        #: The bytes up to the next silence belong to a fault already reported.
+        self._lost = False
+
+    def take(self, byte: int) -> Iterator[Event]:
+        """Collect the byte; no frame is longer than the longest."""
+        if self._lost:
+            return
+        self._raw += bytes((byte,))
+        if len(self._raw) > self.frame.max_wire:
+            raw, self._raw, self._lost = self._raw, b"", True
+            yield self.event("length", raw)
+
+    def give_up(self) -> Iterator[Event]:
+        """The silence ends a frame."""
+        raw, self._raw, self._lost = self._raw, b"", False
+        if not raw:
+            return
+        try:
+            taken = self._reader.read(raw)
+        except BadFrame as bad:
+            yield self.event(bad.kind, raw)
+        else:
+            yield self.judged(taken, raw, self.taken - len(raw))
 
 
 class MarkReceiver(Receiver):

@@ -85,7 +85,7 @@ class AskedBuilder:
         frame = self._frame
         assert isinstance(frame, DelimitedFrame)
         first, *others = answers
-        ended = frame.part("length") or frame.part("terminator")
+        ended = frame.tells_end
         for each in others:
             if not ended and not (first.fixed and each.fixed and first.max_size == each.max_size):
                 what = f"only the request tells {each.name} from {first.name}, but they differ in size"

@@ -31,8 +31,11 @@ _LONGEST_PATTERN = 4
 class CodingBuilder:
     """Builds the codings of one frame."""
 
-    def __init__(self, parts: Sequence[Part], builder: PartBuilder, report: Reporter) -> None:
-        """``parts`` are those of the frame."""
+    def __init__(
+        self, parts: Sequence[Part], builder: PartBuilder, report: Reporter, *, silent: bool
+    ) -> None:
+        """``parts`` are those of the frame; ``silent``: an idle line alone ends it."""
+        self._silent = silent
         self._parts = parts
         self._builder = builder
         self._report = report
@@ -41,7 +44,7 @@ class CodingBuilder:
         """The codings in the order in which they are applied, and the names of the coded parts."""
         if spec is None:
             return (), ()
-        if not any(part.role == "terminator" for part in self._parts):
+        if not self._silent and not any(part.role == "terminator" for part in self._parts):
             what = "coding applies only to frames that a terminator ends"
             hint = "add a part with role: terminator, or use stuffing"
             needs = (_PATH, ("frame", "parts"))
@@ -71,7 +74,7 @@ class CodingBuilder:
 
     def _coded(self, over: Sequence[str] | None, path: Path) -> tuple[str, ...]:
         roles = [part.role for part in self._parts]
-        end = roles.index("terminator")
+        end = roles.index("terminator") if "terminator" in roles else len(roles)
         inner = self._parts[int(roles[0] == "constant") : end]
         if over is None:
             return tuple(part.name for part in inner)

@@ -179,6 +179,7 @@ class PartSpec(Fact):
     shared: StrictBool = Field(default=False, description="A terminator that may begin the next frame too")
     time: Time | None = Field(default=None, description="Silence on the line that ends a frame")
     at_least: Time | None = Field(default=None, description="Its minimum at high speed")
+    alone: StrictBool = Field(default=False, description="Nothing but the silence ends a frame")
     counts: Names | None = Field(default=None, description="Part, or parts, whose bytes a length counts")
     size: WholeRange | None = Field(default=None, description="Minimum..maximum payload size")
     trim: Annotated[TrimSpec, BeforeValidator(_TrimForms.expanded), _TrimForms] | None = Field(

@@ -146,7 +146,7 @@ class FrameBuilder:
         )
         stuffed, coded_as = (spec.stuffing, spec.coding) if isinstance(spec, FrameSpec) else (None, None)
         stuffing = build_stuffing(stuffed, parts, self._parts, self._report) if stuffed else None
-        codings = CodingBuilder(parts, self._parts, self._report)
+        codings = CodingBuilder(parts, self._parts, self._report, silent=bool(silence and silence.alone))
         coding, coded = codings.build(coded_as)
         whole = DelimitedFrame(parts, stuffing, coding, coded, silence, spec.doc, spec.section)
         if not all(self._fits(whole.towards(each), path) for each in whole.ways):
@@ -170,13 +170,30 @@ class FrameBuilder:
         self._check_length(frame, path)
         check_unique(frame, self._report)
         check_terminator_part(frame, self._report)
+        if frame.ends_idle:
+            self._check_idle(frame, path)
         return True
+
+    def _check_idle(self, frame: DelimitedFrame, path: Path) -> None:
+        """Check that nothing but an idle line ends a frame, if the file says so."""
+        for part in frame.parts:
+            if part.role in ("length", "terminator"):
+                what = f"{part.name} tells the end of a frame as well"
+                hint = f"remove alone: true, or {part.name}"
+                self._parts.fault("bad-frame", (*path, part.name), what, hint)
+        if not frame.payload.min_size and not any(part.size for part in frame.parts):
+            what = "a frame may have no byte, which a receiver cannot tell from silence"
+            self._parts.fault("bad-frame", (*path, frame.payload.name), what, "write size: 1..8")
+        if frame.stuffing is not None:
+            what = "stuffing does not apply to frames that only an idle line ends"
+            hint = "write coding: {insert: 00, after: A5}"
+            self._parts.fault("not-applicable", ("frame", "stuffing"), what, hint)
 
     def _check_order(self, frame: DelimitedFrame, path: Path) -> None:
         """Check that what determines the end precedes the payload."""
         names = [part.name for part in frame.parts]
         payload = names.index(frame.payload.name)
-        measured = frame.part("length") is None
+        measured = frame.part("length") is None and not frame.ends_idle
         for index, part in enumerate(frame.parts):
             identifies = measured and any(bits.is_id for bits in part.bits)
             if (part.role == "length" or identifies) and index > payload:

@@ -339,9 +339,7 @@ class MessageBuilder:
 
     def _check_end(self, message: Message, path: Path) -> None:
         """Check that the fields determine the end of a frame without a length or terminator."""
-        if isinstance(self._frame, DelimitedFrame) and (
-            self._frame.part("length") or self._frame.part("terminator")
-        ):
+        if isinstance(self._frame, DelimitedFrame) and self._frame.tells_end:
             return
         for field in message.fields:
             if (is_open(field) or field.terminated) and not message.separator:
@@ -349,7 +347,7 @@ class MessageBuilder:
                 what = f"the end of {field.name} is unknown: {neither}"
                 hint = "give it a count or a fixed size, or give the frame a length or terminator"
                 if isinstance(self._frame, DelimitedFrame) and self._frame.idle:
-                    hint = f"{hint}; receivers do not rely on an idle line alone"
+                    hint = f"{hint}; or write alone: true at the idle line if nothing else ends a frame"
                 self._error("no-frame-end", (*path, field.name), what, hint)
             if field.optional:
                 what = f"{field.name} is optional, but without a length a receiver waits for it"

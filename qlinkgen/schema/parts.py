@@ -36,7 +36,7 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "payload": ("size", "trim"),
     "checksum": ("type", "byteorder", "algorithm", "init", "over", "every", "otherwise", "sent", "as"),
     "terminator": ("value", "text", "shared"),
-    "idle": ("time", "at_least"),
+    "idle": ("time", "at_least", "alone"),
 }
 _KEYS = (
     "type",
@@ -59,6 +59,7 @@ _KEYS = (
     "init",
     "over",
     "every",
+    "alone",
     "otherwise",
     "sent",
     "as",
@@ -181,7 +182,7 @@ class PartBuilder:
         if spec.time is None:
             self._lacks("time", "add time: 3.5 bytes", path)
             return None
-        return Silence(spec.time.byte_times, max(spec.time.seconds, least.seconds))
+        return Silence(spec.time.byte_times, max(spec.time.seconds, least.seconds), spec.alone)
 
     def _value(self, name: str, spec: PartSpec, path: Path) -> Part:
         """A part with a value of every frame, or several in its bits."""

@@ -276,7 +276,8 @@ _ALL = (
     Rule(
         "no-frame-end",
         "A receiver can determine the end of every frame.",
-        "Without a length or terminator, the fields of a message must have fixed sizes or counts.",
+        "Without a length, a terminator or an idle line that alone ends a frame, the fields of a message "
+        "must have fixed sizes or counts.",
     ),
     Rule(
         "terminator-in-frame",

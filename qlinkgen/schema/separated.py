@@ -41,7 +41,7 @@ def check_separator(message: Message, frame: Frame, path: Path, report: Reporter
         )
         return
     end = frame.part("terminator")
-    if end is None and frame.part("length") is None:
+    if not frame.tells_end:
         error(
             f"neither the frame nor {message.name} tells where its last field ends",
             "give the frame a length or a terminator",

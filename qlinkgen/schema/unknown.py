@@ -76,7 +76,7 @@ class UnknownBuilder:
             what = f"a receiver cannot tell an unknown request from a damaged one: {why}"
             self._error((*_PATH, name), what, "remove it; such a request is not answered")
             return False
-        ended = frame.part("length") or frame.part("terminator")
+        ended = frame.tells_end
         if not (ended and frame.preamble) and not frame.idle:
             what = f"{'where an unknown request begins' if ended else 'the end of one'} is not known"
             hint = "add a part with role: idle, if a silence ends frames, or remove it"

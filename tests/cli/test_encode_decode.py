@@ -447,3 +447,28 @@ def test_any_text_as_hex(qlinkgen: Run, text: str) -> None:
     result = qlinkgen("decode", "qlink", "--", text)
     assert result.code in (1, 2)
     assert "a fault of qlinkgen" not in result.err
+
+
+def test_each_line_is_a_frame_where_only_a_silence_ends_one(qlinkgen: Run, tmp_path: Path) -> None:
+    schema = tmp_path / "gauge.yaml"
+    schema.write_text(
+        """\
+qlinkgen: 1
+protocol: {name: gauge, revision: "1", source: Made up}
+frame:
+  parts:
+    code: {role: message, type: u8}
+    data: {role: payload, size: 0..8}
+    sum: {type: u8, algorithm: sum8, over: [code, data]}
+    gap: {role: idle, time: 3.5 bytes, alone: true}
+bus: {kind: master_slave}
+defaults: {repeat: safe}
+commands: {read: {id: 1, request: {text: text}, response: {}}}
+"""
+    )
+    lines = b"01 41 # one\n 42\n01 41 42 84\n\n0101\n01 41 42 84"
+    found = decoded(qlinkgen, schema, "-", stdin=lines, code=1)
+    kinds = [each["error"]["kind"] if "error" in each else each["message"] for each in found]
+    assert kinds == ["crc", "length", "read.request", "read.response", "read.request"]
+    assert len(decoded(qlinkgen, schema, "01 41", "42 84")) == 1
+    assert "one frame on each line" in qlinkgen("decode", schema, "--raw", stdin=b"\1").err

@@ -22,10 +22,12 @@ class Stream:
     Attributes:
         data: the bytes.
         intact: the complete frames, in order.
+        pieces: the bytes of each frame, and those between frames, as a line with silences has them.
     """
 
     data: bytes
     intact: Sequence[bytes]
+    pieces: Sequence[bytes]
 
     def chunks(self) -> Iterator[bytes]:
         """The bytes in pieces, as a port returns them."""
@@ -39,17 +41,18 @@ class Stream:
 def corrupted(frames: Sequence[bytes], kind: str, look_alike: LookAlike) -> Stream:
     """A stream of frames with one kind of corruption, a mixture of all, or none."""
     chance = random.Random(kind)
-    pieces, intact = [], []
+    pieces: list[bytes] = []
+    intact = []
     for frame in frames:
         if chance.randrange(_ONE_IN):
-            arrived = frame
+            arrived = [frame]
         else:
             chosen = chance.choice(KINDS) if kind == "all" else kind
-            arrived = _between(chosen, chance, look_alike) + _inside(chosen, frame, chance)
-        if arrived.endswith(frame):
+            arrived = [_between(chosen, chance, look_alike), _inside(chosen, frame, chance)]
+        if b"".join(arrived).endswith(frame):
             intact.append(frame)
-        pieces.append(arrived)
-    return Stream(b"".join(pieces), intact)
+        pieces += arrived
+    return Stream(b"".join(pieces), intact, pieces)
 
 
 def _inside(kind: str, frame: bytes, chance: random.Random) -> bytes:

@@ -60,6 +60,7 @@ _FRAMINGS: Mapping[str, tuple[Sequence[str], str]] = {
         ('start: {text: ":"}', _CODE, _DATA, _LRC, "end: {role: terminator, value: 0D 0A}"),
         "coding: {digits: hex}",
     ),
+    "a silence alone, CRC": ((_CODE, _DATA, _CRC, "gap: {role: idle, time: 3.5 bytes, alone: true}"), ""),
     "SLIP without a check value": (
         ("open: C0", _CODE, _DATA, "close: {role: terminator, value: C0}"),
         "coding: {replace: {C0: DB DC, DB: DB DD}}",
@@ -83,6 +84,7 @@ def subject(name: str) -> Subject:
     protocol, faults = loads(_SCHEMA.format(parts=indented, coding=f"  {coding}"), "sample.yaml")
     assert protocol is not None, faults
     module, chance = python.load(protocol), random.Random(name)
+    silent = hasattr(module, "IDLE_ALONE")
     told = module.MESSAGES["told"]
     frames = [
         told(number=number, data=chance.randbytes(chance.randint(0, 20))).to_frame()
@@ -90,11 +92,13 @@ def subject(name: str) -> Subject:
     ]
 
     def decoded(chunks: Iterable[bytes]) -> Sequence[bytes]:
-        decoder = module.StreamDecoder("request")
-        events = [event for chunk in chunks for event in decoder.feed(chunk)] + decoder.finish()
+        decoder, events = module.StreamDecoder("request"), []
+        for chunk in chunks:
+            events += decoder.feed(chunk) + (decoder.gap() if silent else [])
+        events += decoder.finish()
         return [event.to_frame() for event in events if not isinstance(event, module.Fault)]
 
-    return Subject(frames, lambda each: frames[0][: each.randint(1, 4)], decoded)
+    return Subject(frames, lambda each: frames[0][: each.randint(1, 4)], decoded, silent)
 
 
 @functools.cache

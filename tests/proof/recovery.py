@@ -40,11 +40,13 @@ class Subject:
         frames: distinct frames, as sent.
         look_alike: makes bytes that look like the beginning of a frame.
         decoded: the frames that a decoder delivers from chunks of a stream.
+        silent: chunks are what lies between two silences.
     """
 
     frames: Sequence[bytes]
     look_alike: LookAlike
     decoded: Callable[[Iterable[bytes]], Sequence[bytes]]
+    silent: bool = False
 
     def stream(self, kind: str) -> Stream:
         """The frames under one kind of corruption."""
@@ -54,7 +56,7 @@ class Subject:
     def result(self, kind: str) -> Result:
         """The result of the decoder."""
         stream = self.stream(kind)
-        delivered = Counter(self.decoded(stream.chunks()))
+        delivered = Counter(self.decoded(stream.pieces if self.silent else stream.chunks()))
         recovered = sum((delivered & Counter(stream.intact)).values())
         return Result(len(stream.intact), recovered, sum((delivered - Counter(self.frames)).values()))
 

@@ -269,7 +269,7 @@ class _Source:
             )
             self._add("            deliver(at, event, &rx, direction);", "        }")
         self._add("    }")
-        if rescan:
+        if rescan or self.header.gaps:
             self._add(
                 "    for (;;) {",
                 "        const @p@_event_t event = @p@_receiver_finish(&rx);",

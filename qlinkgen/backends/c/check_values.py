@@ -12,7 +12,6 @@ from qlinkgen.backends.c.places import Places, any_of, in_hex, indented, refusal
 from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.frame import ATTRIBUTE
 from qlinkgen.plan.check import Check
-from qlinkgen.plan.ends import ByTerminator
 from qlinkgen.plan.parts import CheckPart, Seed
 
 
@@ -185,7 +184,7 @@ class CheckWriter(Places):
         """Statements that verify the check values that are not verified before the payload."""
         if self.alone is not None:
             return []
-        early = () if isinstance(self.frame.end, ByTerminator) else self.envelope.header_checks
+        early = () if self.frame.whole else self.envelope.header_checks
         seeded = self.envelope.seeded
         late = [part for part in self.envelope.checks if part not in (*early, *seeded)]
         lines = [line for part in late for line in self.judge(part, body, end, payload_end)]

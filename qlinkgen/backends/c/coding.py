@@ -39,10 +39,11 @@ class StageView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EndedView:
-    """A frame that a terminator ends.
+    """A frame that a terminator or a silence ends.
 
     Attributes:
         stages: its codings; the first is applied first.
+        size: size of the terminator, 0 if a silence ends the frame.
         closing: size of the terminator and what follows it.
         limit: maximum size of a frame up to its terminator.
         matches: condition for the terminator at offset ``stop``; at ``first`` of a receiver.
@@ -83,6 +84,11 @@ class EndedView:
     put_trailer: list[str]
     put_check: list[str]
     fills: list[str]
+
+    @property
+    def writes_trailer(self) -> bool:
+        """Whether bytes after the payload are written."""
+        return any("trailer" in line for line in (*self.put_trailer, *self.put_check, *self.fills))
 
     @property
     def cobs(self) -> bool:

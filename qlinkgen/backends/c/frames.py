@@ -38,7 +38,7 @@ from qlinkgen.backends.c.views import (
 )
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import member
-from qlinkgen.plan.ends import Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import Gaps, Hunt, InStep, Marks, Receiver, Rescan
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 ReceivedMessages = Sequence[tuple[Direction, Sequence[MessagePlan]]]
@@ -94,6 +94,11 @@ class FrameSection:
     def rescans(self) -> bool:
         """Whether one byte can produce several events."""
         return self.receiver == "receiver_rescan"
+
+    @property
+    def gaps(self) -> bool:
+        """Whether only a silence ends a frame."""
+        return self.receiver == "receiver_gap"
 
     @property
     def slave_only(self) -> bool:
@@ -197,6 +202,13 @@ def _common(plan: Plan, ways: Mapping[str, PartsViews]) -> PartsViews:
     return replace(response, f=view, parts=parts)
 
 
+_RECEIVERS: Mapping[type[Receiver], str] = {
+    Hunt: "receiver_streamed",
+    Rescan: "receiver_rescan",
+    Gaps: "receiver_gap",
+}
+
+
 def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
     """Choose by the way frames are received."""
     if plan.frame.kinds:
@@ -211,7 +223,7 @@ def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
         return FrameSection(plan, several.f, found, several.algorithms, templates, "receiver_rescan")
     receiver, check = plan.frame.receiver, plan.frame.check
     match receiver:
-        case Hunt() | Rescan():
+        case Hunt() | Rescan() | Gaps():
             ways = parts_views(plan, layouts)
             views = _common(plan, ways) if plan.directed else ways[""]
             frame = "frame_stuffed" if views.stuffed else "frame_plain"
@@ -219,7 +231,7 @@ def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
             if views.ended:
                 made = ("coding", "wrap_coded") if views.ended.stages else ("frame_plain",)
                 templates = ("place", "values", *made, "scan_ended", "wrap", "frame_public")
-            kind = "receiver_streamed" if isinstance(receiver, Hunt) else "receiver_rescan"
+            kind = _RECEIVERS[type(receiver)]
             templates = (*templates[:-1], "ways", templates[-1]) if plan.directed else templates
             each = ways if plan.directed else {}
             return FrameSection(plan, views.f, views.others, views.algorithms, templates, kind, each)

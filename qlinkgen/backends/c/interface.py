@@ -34,6 +34,7 @@ class Interface:
         directed: decoding and receiving frames need the expected direction.
         unpacks: decoding a frame needs a buffer.
         rescans: one byte can produce several events, and the end of a stream more.
+        gaps: only a silence ends a frame.
         packets: a response is decoded by the function of its message, and has no receiver.
         listener: name of the struct that receives messages, "" if there is none.
         sum_bits: width of the sum of a request in the check value of its response, 0 if there is none.
@@ -49,6 +50,7 @@ class Interface:
     directed: bool
     unpacks: bool
     rescans: bool
+    gaps: bool
     packets: bool
     listener: str
     sum_bits: int
@@ -143,6 +145,7 @@ def interface(protocol: Protocol) -> Interface:
         directed=view.needs_direction,
         unpacks=bool(view.body_size),
         rescans=section.rescans,
+        gaps=section.gaps,
         packets=section.slave_only,
         listener="" if section.slave_only else section.dispatch.listener,
         sum_bits=_bits(section.request_sum),

@@ -16,7 +16,7 @@ from qlinkgen.backends.c.names import unsigned_type
 from qlinkgen.backends.c.parts import PartWriter, length_bounds
 from qlinkgen.backends.c.places import id_bits, in_hex, sender_of
 from qlinkgen.plan.coding import Insertion
-from qlinkgen.plan.ends import ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import ByMessage, ByTerminator, Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import Plan
@@ -122,6 +122,8 @@ def directed(plan: Plan) -> bool:
     match receiver:
         case Hunt() | InStep():
             return False
+        case Gaps():
+            needed = plan.directed or _uses_direction(plan.frame)
         case Rescan():
             needed = plan.directed or not receiver.verified or _uses_direction(plan.frame)
         case Marks():
@@ -346,7 +348,7 @@ def _parts_views(whole: Plan, plan: Plan, way: str, layouts: Layouts) -> PartsVi
         stuffed=_stuffed(writer, stuffing, passed) if stuffing else None,
         inserted=_inserted(rule) if rule else None,
         hunt=_hunted(writer, receiver) if isinstance(receiver, Hunt) else None,
-        ended=_ended(writer, plan.frame.end, passed) if isinstance(plan.frame.end, ByTerminator) else None,
+        ended=_ended(writer, passed) if plan.frame.whole else None,
     )
 
 
@@ -448,10 +450,13 @@ def _due(rule: Insertion, array: str, end: str, last: str) -> str:
     return " && ".join([f"(since >= {size}U)", *reversed(terms)])
 
 
-def _ended(writer: PartWriter, end: ByTerminator, directed: str) -> EndedView:
-    envelope, coded, data = writer.envelope, writer.frame.transparency, end.part.data
+def _ended(writer: PartWriter, directed: str) -> EndedView:
+    envelope, coded, end = writer.envelope, writer.frame.transparency, writer.frame.end
     assert isinstance(coded, Coded)
-    lead, closing = envelope.preamble, end.part.size + end.after
+    data, after, paired = b"", 0, False
+    if isinstance(end, ByTerminator):
+        data, after, paired = end.part.data, end.after, end.paired is not None
+    lead, closing = envelope.preamble, len(data) + after
     tail, header = envelope.trailer_size, envelope.header_size
     both = header + tail
     return EndedView(
@@ -460,16 +465,16 @@ def _ended(writer: PartWriter, end: ByTerminator, directed: str) -> EndedView:
         lead_checks=[(f"wire[{at}] != {in_hex(byte)}", at + 1) for at, byte in enumerate(lead)],
         size=len(data),
         closing=closing,
-        limit=writer.frame.max_wire - end.after,
+        limit=writer.frame.max_wire - after,
         matches=_matches("wire[stop{}]", data),
         matches_first=_matches("(receiver->wire[receiver->first{}]", data, ")"),
-        last=in_hex(data[-1]),
+        last=in_hex(data[-1]) if data else "",
         lines=writer.frame.lines,
         partial=" || ".join(
             f"((waiting == {size}U) && {_matches('(receiver->wire[receiver->first{}]', data[:size], ')')})"
             for size in range(1, len(data))
         ),
-        step=f"(wire[stop] == {in_hex(data[0])}) ? 2U : 1U" if end.paired is not None else "",
+        step=f"(wire[stop] == {in_hex(data[0])}) ? 2U : 1U" if paired else "",
         kept=writer.frame.kept,
         flag=len(writer.frame.flag),
         front=coded.front,
@@ -491,7 +496,7 @@ def _ended(writer: PartWriter, end: ByTerminator, directed: str) -> EndedView:
 
 def _matches(place: str, data: bytes, closing: str = "") -> str:
     """The condition for bytes at a place; ``{}`` in it is the offset of each."""
-    offsets = ["", *(f" + {at}U" for at in range(1, len(data)))]
+    offsets = [f" + {at}U" if at else "" for at in range(len(data))]
     terms = [
         f"{place.format(offset)} == {in_hex(byte)}{closing}"
         for offset, byte in zip(offsets, data, strict=True)

@@ -13,7 +13,7 @@ from qlinkgen.backends.conformance.rows import Right, Row
 from qlinkgen.model.message import Direction
 from qlinkgen.plan import MessagePlan, Plan
 from qlinkgen.plan.codec import Decoded
-from qlinkgen.plan.ends import Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.parts import MarkPart
 from qlinkgen.plan.receive import receiver
 
@@ -56,6 +56,8 @@ def noise(plan: Plan) -> tuple[bytes, ...]:
         case InStep():
             ids = {message.id for message in plan.protocol.messages}
             return bytes((next((number for number in range(0xFF, -1, -1) if number not in ids), 0),)), b""
+        case Gaps():
+            return (b"",)
         case _:
             assert_never(strategy)
 
@@ -95,7 +97,8 @@ def _heard(
             continue
         data = (pieces[index % len(pieces)] if noisy else b"") + row.wire
         heard = [event for byte in data for event in listener.feed(byte)]
-        if isinstance(plan.frame.receiver, Rescan) and index == len(rows) - 1:
+        last = isinstance(plan.frame.receiver, Rescan) and index == len(rows) - 1
+        if last or isinstance(plan.frame.receiver, Gaps):
             heard += listener.finish()
         intact += [event.decoded for event in heard if event.decoded]
         events.append(tuple(INTACT if event.decoded else event.kind for event in heard))

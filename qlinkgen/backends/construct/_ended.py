@@ -1,4 +1,4 @@
-"""Frames that a terminator ends, and the codings that keep it from occurring before.
+"""Frames that a terminator or a silence ends, and codings that keep a terminator from occurring before.
 
 Codings apply one after the other to the bytes of the parts ``over``; decoding goes the other way.
 """
@@ -129,6 +129,8 @@ Coding = Escape | Stuffing | Cobs | Digits | Pair | Add
 class EndedFrame(Frame):
     """A frame that its part ``end`` ends, which does not occur before; it has at most ``most`` bytes.
 
+    Without ``end``, a silence ends it: all bytes are one frame.
+
     Its payload has at least ``least`` bytes. With ``paired``, the first byte of the end also begins pairs.
 
     With ``bare`` it does not begin with a constant, so an unknown id or an illegal address is detected first.
@@ -139,7 +141,7 @@ class EndedFrame(Frame):
         parts: Sequence[Part],
         messages: Iterable[Message],
         *,
-        end: str,
+        end: str = "",
         most: int,
         over: Sequence[str],
         least: int = 0,
@@ -152,14 +154,14 @@ class EndedFrame(Frame):
         names = [part.name for part in parts]
         sizes = [_size(part) for part in parts]
         last = names.index(over[-1]) + 1
-        self.end = parts[names.index(end)]
+        self.end = parts[names.index(end)] if end else None
         self.most = most
         self.paired = paired
         self.least = least
         self.coding = coding
         self.front = sum(sizes[: names.index(over[0])])
         self.back = sum(sizes[last:])
-        self.closing = sum(sizes[names.index(end) :])
+        self.closing = sum(sizes[names.index(end) :]) if end else 0
         self.sizes = dict(zip(names, sizes, strict=True))
 
     def wrap(
@@ -218,6 +220,8 @@ class EndedFrame(Frame):
         """Offset of the end of the frame."""
         first, last = self.parts[0], self.end
         lead = first.data if isinstance(first, Constant) else b""
+        if last is None:
+            return self._silent(wire, lead)
         assert isinstance(last, Constant)
         if not lead.startswith(wire[: len(lead)]):
             raise FrameError("frame", f"the frame does not begin with {lead.hex()}")
@@ -228,6 +232,16 @@ class EndedFrame(Frame):
         if stop < 0 or len(wire) < stop + self.closing:
             raise FrameError("truncated", f"incomplete frame of {len(wire)} bytes")
         return stop + self.closing
+
+    def _silent(self, wire: bytes, lead: bytes) -> int:
+        """The end of the bytes between two silences."""
+        if not wire:
+            raise FrameError("truncated", "no bytes")
+        if not lead.startswith(wire[: len(lead)]):
+            raise FrameError("frame", f"the frame does not begin with {lead.hex()}")
+        if not len(lead) <= len(wire) <= self.most:
+            raise FrameError("length", f"frame of {len(wire)} bytes")
+        return len(wire)
 
     def _stop(self, wire: bytes, at: int, limit: int, end: bytes) -> int:
         """Offset of the terminator, -1 if there is none."""

@@ -22,7 +22,7 @@ from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import record_key
 from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
-from qlinkgen.plan.ends import ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import ByTerminator, Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
@@ -344,8 +344,8 @@ def _frame(frame: FramePlan, layout: Node, messages: Sequence) -> Call:
     match frame.receiver:
         case Hunt():
             return Call("DelimitedFrame", (layout, messages), (*settings, ("hunt", True)))
-        case Rescan() if isinstance(frame.end, ByTerminator):
-            return _ended(frame, frame.end, layout, messages, address)
+        case Rescan() | Gaps() if frame.whole:
+            return _ended(frame, layout, messages, address)
         case Rescan():
             bare = (("bare", True),) if frame.receiver.bare else ()
             return Call("DelimitedFrame", (layout, messages), (*settings, *bare))
@@ -353,25 +353,30 @@ def _frame(frame: FramePlan, layout: Node, messages: Sequence) -> Call:
             return Call("MarkedFrame", (layout, messages), settings)
         case InStep():
             return Call("Packet", (layout, messages), settings)
+        case Gaps():
+            raise AssertionError("a silence is found first")
         case _:
             assert_never(frame.receiver)
 
 
 def _ended(
     frame: FramePlan,
-    end: ByTerminator,
     layout: Node,
     messages: Sequence,
     address: tuple[tuple[str, Node], ...],
 ) -> Call:
-    coded = frame.transparency
+    coded, end = frame.transparency, frame.end
     assert isinstance(coded, Coded)
     bare = (("bare", True),) if isinstance(frame.receiver, Rescan) and frame.receiver.bare else ()
     coding = (("coding", Sequence(tuple(map(_stage, coded.stages)))),) if coded.stages else ()
     over = tuple(part.name for part in frame.envelope.between(coded.front, coded.back))
     least = (("least", frame.envelope.payload.least),) if frame.envelope.payload.least else ()
-    paired = (("paired", True),) if end.paired is not None else ()
-    places = (("end", end.part.name), ("most", frame.max_wire), ("over", Sequence(over)), *least, *paired)
+    paired: tuple[tuple[str, Node], ...] = ()
+    last: tuple[tuple[str, Node], ...] = ()
+    if isinstance(end, ByTerminator):
+        last = (("end", end.part.name),)
+        paired = (("paired", True),) if end.paired is not None else ()
+    places = (*last, ("most", frame.max_wire), ("over", Sequence(over)), *least, *paired)
     return Call("EndedFrame", (layout, messages), (*address, *bare, *coding, *places))
 
 

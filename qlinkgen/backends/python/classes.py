@@ -23,7 +23,7 @@ from qlinkgen.model.frame import ATTRIBUTE
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import pascal
 from qlinkgen.model.types import Scalar
-from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, ByTerminator
+from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import Seed
 from qlinkgen.plan.payload import (
@@ -322,7 +322,7 @@ def _measured(message: MessagePlan) -> bool:
     match end:
         case ByMessage():
             return True
-        case ByLength() | ByMark() | ByTerminator() | ByKind():
+        case ByLength() | ByMark() | ByTerminator() | BySilence() | ByKind():
             return False
         case _:
             assert_never(end)

@@ -128,9 +128,10 @@ class StuffingView:
 
 @dataclass(frozen=True)
 class EndedView:
-    """A terminator, and the coding of the bytes before it.
+    """A terminator, or a silence, and the coding of the bytes before it.
 
     Attributes:
+        terminator: "" if a silence ends a frame.
         last: its last byte.
         pair: its first byte if that also begins pairs of coded bytes, otherwise "".
         kept: number of its bytes that may begin the next frame.
@@ -257,6 +258,21 @@ class PartsView:
     def check(self) -> CheckView | None:
         """The algorithm of the main check value, None if there is none."""
         return self.main.view if self.main else None
+
+    @property
+    def limited(self) -> bool:
+        """Whether a receiver counts the bytes up to the longest frame."""
+        return self.bare or self.silent
+
+    @property
+    def silent(self) -> bool:
+        """Whether only a silence ends a frame."""
+        return self.ended is not None and not self.ended.terminator
+
+    @property
+    def decoder(self) -> str:
+        """The template of the decoder of a stream."""
+        return "gap" if self.silent else self.template
 
     @property
     def quick(self) -> bool:

@@ -29,7 +29,7 @@ from qlinkgen.model.frame import Silence
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.naming import address_argument, address_attribute
 from qlinkgen.plan.check import Check
-from qlinkgen.plan.ends import ByLength, ByMark, ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import ByLength, ByMark, ByTerminator, Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import (
     AddressPart,
@@ -55,7 +55,9 @@ def view_of(plan: Plan, title: str, sizes: Sequence[int]) -> FrameView:
         case Hunt():
             return _unique(plan, receiver, title, sizes)
         case Rescan():
-            return _parts(plan, receiver, title)
+            return _parts(plan, title, bare=receiver.bare, verified=receiver.verified)
+        case Gaps():
+            return _parts(plan, title, bare=False, verified=True)
         case Marks():
             return _marked(plan, title)
         case InStep():
@@ -183,11 +185,11 @@ def wrap_lines(view: UniqueView, fixed: int | None) -> list[str]:
     ]
 
 
-def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
+def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
     envelope = plan.frame.envelope
     address = _address_view(plan)
     length = _length_view(plan, envelope)
-    checks, filling = all_placed(envelope, early=not isinstance(plan.frame.end, ByTerminator))
+    checks, filling = all_placed(envelope, early=not plan.frame.whole)
     last = envelope.parts[-1]
     return PartsView(
         title=title,
@@ -203,9 +205,7 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         length=length,
         stuffing=_stuffing(plan),
         idle=_idle(plan.frame.idle),
-        ended=_ended(plan, plan.frame.end, bare=receiver.bare)
-        if isinstance(plan.frame.end, ByTerminator)
-        else None,
+        ended=_ended(plan, bare=bare) if plan.frame.whole else None,
         preamble=literal(envelope.preamble) if envelope.preamble else "",
         begins_with=envelope.preamble.hex(" "),
         header=envelope.header_size,
@@ -218,9 +218,9 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         id_of=pieces.number(envelope, envelope.id, "head"),
         id_of_frame=_quick_id(envelope),
         address_of=pieces.number(envelope, envelope.address, "head") if _leads(envelope) else "",
-        bare=receiver.bare,
-        verified=receiver.verified,
-        head_checks=list(_head_checks(plan, envelope, bare=receiver.bare)),
+        bare=bare,
+        verified=verified,
+        head_checks=list(_head_checks(plan, envelope, bare=bare)),
         values=[attribute(member.name) for _, member in envelope.values],
         counter=_counter(plan),
         tail_tests=[test for part in envelope.back for test in _tail_tests(envelope, part)],
@@ -271,18 +271,21 @@ def _idle(silence: Silence | None) -> tuple[float, float] | None:
     return (float(silence.byte_times), float(silence.seconds)) if silence else None
 
 
-def _ended(plan: Plan, end: ByTerminator, *, bare: bool) -> EndedView:
-    envelope, coded, part = plan.frame.envelope, plan.frame.transparency, end.part
+def _ended(plan: Plan, *, bare: bool) -> EndedView:
+    envelope, coded, end = plan.frame.envelope, plan.frame.transparency, plan.frame.end
     assert isinstance(coded, Coded)
-    lead, closing = len(envelope.preamble), part.size + end.after
+    last, after, paired = b"", 0, False
+    if isinstance(end, ByTerminator):
+        last, after, paired = end.part.data, end.after, end.paired is not None
+    lead, closing = len(envelope.preamble), len(last) + after
     return EndedView(
-        terminator=literal(part.data),
-        last=literal(part.data[-1:]),
-        pair=literal(part.data[:1]) if end.paired is not None else "",
+        terminator=literal(last) if last else "",
+        last=literal(last[-1:]),
+        pair=literal(last[:1]) if paired else "",
         kept=plan.frame.kept,
         closing=closing,
-        after=end.after,
-        limit=plan.frame.max_wire - end.after,
+        after=after,
+        limit=plan.frame.max_wire - after,
         lead=lead,
         front=coded.front,
         back=coded.back,

@@ -161,9 +161,8 @@ class Module:
         )
         asked = replace(module, f=views.get("request", view))
         refusing = sections.ways.of(_placed("unknown.j2", asked), "request")
-        decoder = _placed(
-            f"{view.template}_decoder.j2", module, search=sections.search, refusing=refusing
-        ).strip()
+        template = view.decoder if isinstance(view, PartsView) else view.template
+        decoder = _placed(f"{template}_decoder.j2", module, search=sections.search, refusing=refusing).strip()
         return _tidy(_placed("module.j2", module, frame=sections.frame, decoder=decoder))
 
     def _doc(self) -> list[str]:
@@ -277,6 +276,7 @@ class Module:
                 pass
             case UniqueView() | PartsView():
                 names += ["IDLE"] if view.idle else []
+                names += ["IDLE_ALONE"] if isinstance(view, PartsView) and view.silent else []
         if not isinstance(view, PacketView):
             names += ["encode", *(["Codec"] if view.check and view.check.selectable else [])]
         return sorted(set(names), key=by_kind)

@@ -9,7 +9,7 @@ from typing import assert_never
 from qlinkgen.backends.python.names import named_classes
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.naming import address_attribute
-from qlinkgen.plan.ends import Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import CheckPart, Part
 from qlinkgen.plan.payload import Member
@@ -112,7 +112,7 @@ def place_of(plan: Plan) -> Place:
             unique = True
         case Rescan() if plan.frame.kinds:
             envelope, unique = None, False
-        case Rescan():
+        case Rescan() | Gaps():
             envelope, unique = plan.frame.envelope, False
         case Marks() | InStep():
             envelope, unique = None, False

@@ -223,6 +223,11 @@ def stream(frames: Sequence[bytes], alphabet: bytes, rng: random.Random) -> byte
     return damaged(bytes(data), alphabet, rng)
 
 
+def between(frames: Sequence[bytes], alphabet: bytes, rng: random.Random) -> bytes:
+    """What lies between two silences: one frame, usually damaged."""
+    return damaged(rng.choice(frames), alphabet, rng)
+
+
 def damaged(stream: bytes, alphabet: bytes, rng: random.Random) -> bytes:
     """A stream with noise in a few places or none."""
     data = bytearray(stream)

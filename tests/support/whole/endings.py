@@ -22,6 +22,20 @@ class Ending:
         return self.codings[0] if len(self.codings) == 1 else self.codings
 
 
+def silence(rng: random.Random, parts: Doc) -> None:
+    """Let only an idle line end the frame: without terminator and length."""
+    gone = [name for name, spec in parts.items() if spec.get("role") in ("terminator", "length")]
+    for name in gone:
+        del parts[name]
+    payload = next(name for name, spec in parts.items() if spec.get("role") == "payload")
+    for spec in parts.values():
+        if "over" in spec:
+            spec["over"] = [each for each in spec["over"] if each not in gone] or [payload]
+    time = rng.choice(("3.5 bytes", "20 ms", "4 bytes"))
+    least = {"at_least": rng.choice(("1750 us", "1 ms"))} if rng.random() < 0.5 else {}
+    parts["silence"] = {"role": "idle", "time": time, "alone": True, **least}
+
+
 def choose(rng: random.Random) -> Ending:
     """An ending of any kind."""
     kinds = ("bare", "escape", "replace", "cobs", "digits", "pair", "list")

@@ -116,6 +116,8 @@ def choose(rng: random.Random, words: _Words) -> Shape:
         time = rng.choice(("3.5 bytes", "20 ms", "4 bytes"))
         least = {"at_least": rng.choice(("1750 us", "1 ms"))} if rng.random() < 0.5 else {}
         shape.frame["parts"]["silence"] = {"role": "idle", "time": time, **least}
+    elif kind == "ended" and more.random() < 0.3:
+        endings.silence(more, shape.frame["parts"])
     for key in ("parts", "packet"):
         parts: Doc = shape.frame.get(key, {})
         for name, spec in parts.items():

@@ -341,8 +341,11 @@ class _Trial:
             if not frames:
                 continue
             alphabet = b"".join(frame[:4] + frame[-2:] for frame in frames) + bytes([self.mark, 0])
+            frame = self.reference.frame
+            one = isinstance(frame, Frame) and frame.silent
             for _ in range(self.effort.streams):
-                self._stream(direction, chance.stream(frames, alphabet, self.rng))
+                made = chance.between if one and self.rng.random() < 0.8 else chance.stream
+                self._stream(direction, made(frames, alphabet, self.rng))
 
     def _answers(self) -> None:
         """Streams of expected packets."""
@@ -558,7 +561,8 @@ def traits(reference: Reference) -> str:
     if not isinstance(frame, Frame):
         return type(frame).__name__.lower()
     words = ["hunt" if frame.unique else "search", "bare" if frame.bare else "lead"]
-    words += ["ended" if frame.terminator else "length" if "length" in frame.by_role else "counts"]
+    found = {"silent": frame.silent, "ended": frame.terminator, "length": "length" in frame.by_role}
+    words.append(next((name for name, ends_it in found.items() if ends_it), "counts"))
     words += [each.kind for each in frame.codings]
     words += [] if "checksum" in frame.by_role else ["unchecked"]
     words += ["end"] if frame.parts[-1].role == "constant" else []

@@ -15,6 +15,7 @@ from tests.support.whole.reference.notation import Direction, Doc, load, part_do
 from tests.support.whole.reference.receivers import (
     Event,
     Hunter,
+    Listener,
     MarkedReceiver,
     PacketReceiver,
     Receiver,
@@ -197,6 +198,8 @@ class Reference:
             return MarkedReceiver(frame, known)
         if isinstance(frame, Packets):
             return PacketReceiver(frame, known, asked, answers=direction == "response")
+        if frame.silent:
+            return Listener(frame, known)
         return Hunter(frame, known) if frame.unique else Searcher(frame, known)
 
     def events(self, direction: Direction, stream: bytes, asked: Sequence[bytes] = ()) -> list[Event]:

@@ -200,18 +200,20 @@ class Frame:
         #: Bytes of one step of the length.
         self.step = length.spec.get("scale", 1) if length else 1
         #: No leading constant: a candidate begins with a known message and a legal address.
-        self.bare = self.parts[0].role != "constant"
+        self.bare = self.parts[0].role != "constant" and not frame.get("silent")
         most, stuffing = self.most, self.stuffing
         self.terminator = self.by_role.get("terminator")
+        #: Only a silence ends a frame.
+        self.silent = bool(frame.get("silent"))
         self.codings = codings(frame.get("coding"))
-        self._over = _coded_names(frame.get("coding"), self.parts)
+        self._over = _coded_names(frame.get("coding"), self.parts, silent=self.silent)
         #: Maximum payload size on the wire, including inserted bytes if the length counts them.
         self.most_sent = most + most // len(stuffing.after) if stuffing and stuffing.payload_alone else most
 
     @property
     def longest(self) -> int:
         """Number of bytes after which those outside of frames are reported."""
-        if self.terminator is None:
+        if self.terminator is None and not self.silent:
             return self.overhead + self.most_sent + self.added(self.most_sent)
         inner = outer = 0
         for part in self.parts:
@@ -226,9 +228,10 @@ class Frame:
 
     def ended(self, wire: bytes) -> Cut:
         """The frame up to its terminator. Raises NeedMore or Refused."""
-        assert self.terminator
         first = self.parts[0]
         lead = first.constant if first.role == "constant" else b""
+        if self.terminator is None:
+            return self._between(wire, lead)
         if wire[: len(lead)] != lead[: len(wire)]:
             raise Refused("frame", told=False)
         end, names = self.terminator.constant, [part.name for part in self.parts]
@@ -248,6 +251,14 @@ class Frame:
             raise NeedMore
         kept = len(end) if end == lead and not after else 0
         return Cut(self._opened(wire[:size]), size, pending=False, kept=kept)
+
+    def _between(self, wire: bytes, lead: bytes) -> Cut:
+        """The frame between two silences. Raises Refused."""
+        if any(ours != theirs for ours, theirs in zip(lead, wire, strict=False)):
+            raise Refused("frame")
+        if not len(lead) <= len(wire) <= self.longest:
+            raise Refused("length")
+        return Cut(self._opened(wire), len(wire), pending=False)
 
     def begins_pair(self, byte: int) -> bool:
         """Whether a byte begins a pair of coded bytes, and the terminator."""
@@ -426,7 +437,7 @@ class Frame:
 
     def _stuffed(self, cut: Mapping[str, bytes]) -> bytes:
         wire, run = b"", b""
-        if self.terminator:
+        if self.terminator or self.silent:
             return self._coded(cut)
         for part in self.parts:
             if self.stuffed(part):
@@ -508,15 +519,16 @@ class Frame:
         return number
 
 
-def _coded_names(spec: Any, parts: list[Part]) -> list[str]:
+def _coded_names(spec: Any, parts: list[Part], *, silent: bool) -> list[str]:
     """Names of the coded parts: all between the first constant and the terminator unless stated."""
     roles, names = [part.role for part in parts], [part.name for part in parts]
-    if "terminator" not in roles:
+    if "terminator" not in roles and not silent:
         return []
     for each in spec if isinstance(spec, list) else [spec or {}]:
         if "over" in each:
             return list(each["over"])
-    return names[int(roles[0] == "constant") : roles.index("terminator")]
+    end = len(names) if silent else roles.index("terminator")
+    return names[int(roles[0] == "constant") : end]
 
 
 def _stuffing(spec: Any) -> Stuffing | None:
@@ -591,7 +603,7 @@ class Splitter:
 
     def split(self, wire: bytes) -> Cut:
         """The frame at the beginning, checked byte by byte. Raises NeedMore or Refused."""
-        if self._frame.terminator:
+        if self._frame.terminator or self._frame.silent:
             return self._ended(wire)
         frame, cursor, cut = self._frame, Cursor(wire, self._frame), dict[str, bytes]()
         for part in frame.parts[: frame.payload_at]:

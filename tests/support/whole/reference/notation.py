@@ -63,11 +63,11 @@ def load(text: str) -> Doc:
     """The plain data of a schema file."""
     document: Doc = _newest(yaml.load(text, _Loader))
     parts = document.get("frame", {}).get("parts", {})
-    # Silence has no bytes, and frames end without it.
+    # Silence has no bytes, and frames end without it unless nothing else ends them.
     for name in [
         name for name, spec in parts.items() if isinstance(spec, dict) and spec.get("role") == "idle"
     ]:
-        del parts[name]
+        document["frame"]["silent"] = parts.pop(name).get("alone", False)
     return document
 
 

@@ -294,6 +294,34 @@ class Searcher(Receiver):
         return self.carried(message, address, lambda: payload, self.start, raw, beside=beside)
 
 
+class Listener(Receiver):
+    """What lies between two silences is a frame or one fault."""
+
+    def __init__(self, frame: Frame, known: Mapping[int, Message]) -> None:
+        """Hear nothing."""
+        super().__init__(known)
+        self.frame, self.raw, self.lost = frame, b"", False
+
+    def take(self, byte: int) -> Iterator[Event]:
+        """One step."""
+        self.raw += b"" if self.lost else bytes([byte])
+        if len(self.raw) > self.frame.longest:
+            yield Event("length", self.at, self.at + 1 - len(self.raw), self.raw)
+            self.raw, self.lost = b"", True
+
+    def finish(self) -> Iterator[Event]:
+        """A silence."""
+        if not self.raw:
+            return
+        offset = self.at - len(self.raw)
+        whole = Searcher(self.frame, self.known)
+        whole.at, whole.start = self.at, offset
+        try:
+            yield whole.whole(self.raw)
+        except Wrong as wrong:
+            yield Event(wrong.kind, self.at, offset, self.raw)
+
+
 class MarkedReceiver(Receiver):
     """Header and end have a marker bit that the bytes between them lack."""
 

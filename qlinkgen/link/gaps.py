@@ -1,0 +1,46 @@
+"""Silences that end frames, where nothing else does."""
+
+from __future__ import annotations
+
+from qlinkgen.link.codec import Module
+
+
+def silence_of(codec: Module, byte_time: float) -> float:
+    """Seconds of the idle line that alone ends a frame of a protocol, 0 if something else does."""
+    silence: tuple[float, float] | None = getattr(codec, "IDLE", None)
+    if silence is None or not getattr(codec, "IDLE_ALONE", False):
+        return 0.0
+    return max(silence[0] * byte_time, silence[1])
+
+
+class Gap:
+    """The time at which the line has been idle for long enough to end a frame.
+
+    Attributes:
+        span: seconds of that silence; 0 where frames end otherwise, and no time is kept.
+        due: when the line will have been idle, None if no bytes wait for it.
+    """
+
+    __slots__ = ("due", "span")
+
+    def __init__(self, span: float) -> None:
+        self.span = span
+        self.due: float | None = None
+
+    def heard(self, now: float) -> None:
+        """Restart the silence after received bytes."""
+        if self.span:
+            self.due = now + self.span
+
+    def passed(self, now: float) -> bool:
+        """Whether the silence is over; once for each."""
+        if self.due is None or now < self.due:
+            return False
+        self.due = None
+        return True
+
+    def before(self, other: float | None) -> float | None:
+        """The earlier of two times, either of which may be missing."""
+        if self.due is None or other is None:
+            return other if self.due is None else self.due
+        return min(self.due, other)
