@@ -71,14 +71,9 @@ def check_bytes(check: Check, number: str = "crc") -> str:
 
 def placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> PlacedCheck:
     """The view of a check value."""
-    covered = " + ".join(
-        f"message.{seed_name(run)}"
-        if isinstance(run, Seed)
-        else f"frame[{_edge(envelope, run[0])}:{_edge(envelope, run[-1], after=True)}]"
-        for run in envelope.coverage(part)
-    )
     view = check_view(part.check, mark)
     start, end = _edge(envelope, part), _edge(envelope, part, after=True)
+    covered = _covered(envelope, part, "frame")
     seeded, main = part in envelope.seeded, part is envelope.check
     checksum = "checksum" if main else f"_CHECKSUM{mark}"
     case = ".upper()" if part.check.value.digits else ""
@@ -97,6 +92,7 @@ def placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> Pl
         start=start,
         end=end,
         covered=covered,
+        ahead="" if end else _covered(envelope, part, "body", start),
         otherwise=part.check.otherwise,
         mark=mark,
         seeded=seeded,
@@ -106,6 +102,19 @@ def placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> Pl
         wrong=wrong,
         case=case,
     )
+
+
+def _covered(envelope: Envelope, part: CheckPart, data: str, end: str = "") -> str:
+    """Expression for the bytes that a check value covers; ``end`` is the place of the end of the data."""
+    found = []
+    for run in envelope.coverage(part):
+        if isinstance(run, Seed):
+            found.append(f"message.{seed_name(run)}")
+            continue
+        first, after = _edge(envelope, run[0]), _edge(envelope, run[-1], after=True)
+        cut = f"[{first}:{after if after != end else ''}]"
+        found.append(data if cut == "[:]" else data + cut)
+    return " + ".join(found)
 
 
 def all_placed(envelope: Envelope, *, early: bool) -> tuple[list[PlacedCheck], list[PlacedCheck]]:

@@ -172,6 +172,7 @@ class PlacedCheck:
     """A check value, its offsets in the frame, and the expression for the bytes that it covers.
 
     Attributes:
+        ahead: the same for the bytes before it, ``body``; "" unless it is the last part.
         mark: what the names of its functions end with, "" for the main one.
         seeded: it covers attributes of the message.
         main: another algorithm can replace it.
@@ -186,6 +187,7 @@ class PlacedCheck:
     start: str
     end: str
     covered: str
+    ahead: str
     otherwise: int | None
     mark: str
     seeded: bool
