@@ -316,10 +316,12 @@ class MessageBuilder:
     def _check_size(self, message: Message, path: Path) -> None:
         low, high = self._limits()
         assert high is not None
-        if message.max_size > high:
-            excess = message.max_size - high
-            hint = f"the frame allows {high}; shorten a field by {excess}, or raise this limit"
-            self._error("payload-too-long", path, f"{message.name} has up to {message.max_size} bytes", hint)
+        # The maximum of records of variable size is what the frame allows; their minimum may be more.
+        for what, size in (("at least", message.min_size), ("up to", message.max_size)):
+            if size > high:
+                hint = f"the frame allows {high}; shorten a field by {size - high}, or raise this limit"
+                self._error("payload-too-long", path, f"{message.name} has {what} {size} bytes", hint)
+                break
         least = 0 if message.empty_is_default else message.min_size
         if least < low:
             what = f"{message.name} can have as few as {least} bytes"

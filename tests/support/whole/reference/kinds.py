@@ -31,7 +31,8 @@ class Kinds:
     def messages(self) -> Iterator[Message]:
         """All messages, in order."""
         for message in self._messages():
-            yield document.with_separator(message, self._document(message.frames))
+            bounded = replace(message, limit=self._fields(message.frames).most)
+            yield document.with_separator(bounded, self._document(message.frames))
 
     def _messages(self) -> Iterator[Message]:
         data, defaults = self._data, self._data.get("defaults", {})
