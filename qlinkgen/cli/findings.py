@@ -11,10 +11,12 @@ from qlinkgen.cli.span_text import check_number
 from qlinkgen.plan.describe import (
     bytes_text,
     check_text,
+    constant_text,
+    filled_number,
+    filled_text,
     id_text,
     limits_text,
     number_of,
-    number_text,
     part_text,
     span_text,
     transparency_text,
@@ -22,7 +24,7 @@ from qlinkgen.plan.describe import (
 )
 from qlinkgen.plan.ends import ByLength, ByMark
 from qlinkgen.plan.parts import BlocksPart, CellPart, CheckPart, ConstantPart, EqualPart, LengthPart, MarkPart
-from qlinkgen.plan.payload import ConstantStep, Member, Step
+from qlinkgen.plan.payload import ConstantStep, FilledStep, Member, Step
 from qlinkgen.plan.spans import Dissection, Fault, Rule
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan
@@ -268,13 +270,17 @@ def _value(fault: Fault) -> Words:
     assert isinstance(fault.of, Step | Member)
     scalar = number_of(fault.of)
     seen = fault.seen or 0
+    if isinstance(fault.of, FilledStep):
+        received, right = (filled_number(fault.of, each) for each in (seen, fault.right or 0))
+        rule = f"{fault.inside}{fault.of.name} is {received}, but {filled_text(fault.of)} gives {right}"
+        return rule, "bytes were corrupted, or the sender computes another value"
     if scalar is None:
         return (
             f"{fault.inside}{fault.of.name} has an invalid byte 0x{seen:02X}",
             "bytes were corrupted on the wire",
         )
     if isinstance(fault.of, ConstantStep):
-        always = number_text(scalar.default)
+        always = constant_text(fault.of)
         cause = "another message or revision of the protocol"
         return f"{fault.inside}{fault.of.name} is {seen}, but is always {always}", cause
     rule = f"{fault.inside}{fault.of.name} is {value_text(scalar, seen)}, allowed are {limits_text(scalar)}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import assert_never
 
 from qlinkgen.plan.content import unpack_items
-from qlinkgen.plan.describe import id_text, part_text, value_text
+from qlinkgen.plan.describe import filled_number, id_text, part_text, value_text
 from qlinkgen.plan.parts import (
     AddressPart,
     BlocksPart,
@@ -24,6 +24,7 @@ from qlinkgen.plan.payload import (
     BytesStep,
     ConstantStep,
     CountStep,
+    FilledStep,
     ItemsStep,
     Member,
     RecordsStep,
@@ -92,6 +93,8 @@ def _of_field(field: Step | Member, span: Span) -> str:
             return value_text(field.number, number)
         case CountStep():
             return str(number)
+        case FilledStep():
+            return f"{filled_number(field, number)}{'' if span.fault else ', right'}"
         case BitsStep():
             return f"0x{number & field.integer.mask:0{2 * field.integer.size}X}"
         case BytesStep():

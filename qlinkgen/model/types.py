@@ -14,6 +14,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import ClassVar, Literal
 
+from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.digits import Digits
 from qlinkgen.model.floats import Float
 from qlinkgen.model.integer import BitOrder, ByteOrder, Chunk, Integer, byte_chunks, group_chunks, packed_size
@@ -27,9 +28,11 @@ __all__ = [
     "Bits",
     "Blob",
     "ByteOrder",
+    "Checked",
     "Chunk",
     "Constant",
     "Count",
+    "Derived",
     "Enum",
     "Flags",
     "Float",
@@ -142,7 +145,9 @@ class Settable:
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """Sent as the default; receivers reject other values."""
+    """Sent as the default; receivers reject other values, except those that are ``accepted``."""
+
+    accepted: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +167,27 @@ class Count:
     beside: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """The check value of earlier fields that follow each other: filled and verified by the codec."""
+
+    algorithm: Checksum
+    #: Names of the first and the last of them.
+    first: str
+    last: str
+
+
+@dataclass(frozen=True, slots=True)
+class Derived:
+    """An earlier number, inverted or not, plus ``added``: filled and verified by the codec."""
+
+    of: str
+    inverted: bool
+    added: int
+
+
 #: How a codec treats an integer.
-Role = Settable | Constant | Reserved | Count
+Role = Settable | Constant | Reserved | Count | Checked | Derived
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,8 @@ Every target checks a whole frame in this order:
 6. a wrong check value: ``crc``, or ``illegal`` if it signals a refused request;
 7. a message number that the direction does not have: ``unknown``; then a wrong check value that covers an
    attribute of the message: ``crc``;
-8. the payload: wrong sizes are ``length``, then illegal values ``range``; last the address and the values
+8. the payload: wrong sizes are ``length``, then illegal values ``range``, and wrong check values among the
+   fields ``crc``; last the address and the values
    of the frame, ``range``. A payload in which fields may be absent is walked instead, in wire order: for
    each field its size, ``length``, then its value, ``range`` (see `walk`).
 

@@ -21,6 +21,7 @@ from qlinkgen.plan.payload import (
     Compare,
     ConstantStep,
     CountStep,
+    FilledStep,
     Holder,
     Infer,
     ItemsStep,
@@ -32,6 +33,7 @@ from qlinkgen.plan.payload import (
     RecordStep,
     ReservedStep,
     RunStep,
+    Segment,
     Step,
     ValueStep,
     holders,
@@ -104,7 +106,10 @@ def pack(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
             raise Unsendable(_public(plan, unsendable.field), unsendable.value) from None
     whole = {each.name: values.get(each.name, default_of(each)) for each in plan.settable}
     counts = {run.name: _count(run, whole[run.name]) for run in plan.runs}
-    return plan.trimmed(b"".join(_packed(step, whole, counts) for step in plan.steps))
+    data = b""
+    for step in plan.steps:
+        data += _filled(step, data, counts) if isinstance(step, FilledStep) else _packed(step, whole, counts)
+    return plan.trimmed(data)
 
 
 def _pack_separated(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
@@ -162,15 +167,31 @@ def _pack_walked(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
         for each in holders(segment.steps):
             if (values[each.name] is not None) != sent:
                 raise Unsendable(each.name, values[each.name])
-        data += (
-            b"".join(_packed(step, values, counts | sizes.get(step.name, {})) for step in segment.steps)
-            if sent
-            else b""
-        )
+        data += _segment(segment, values, counts, sizes) if sent else b""
     if len(data) > plan.most:
         field = next(step for segment in plan.segments if (step := segment.records))
         raise Unsendable(field.name, values[field.name])
     return data
+
+
+def _segment(
+    segment: Segment,
+    values: Mapping[str, Raw],
+    counts: Mapping[str, int],
+    sizes: Mapping[str, Mapping[str, int]],
+) -> bytes:
+    data = b""
+    for step in segment.steps:
+        if isinstance(step, FilledStep):
+            data += _filled(step, data, counts)
+        else:
+            data += _packed(step, values, {**counts, **sizes.get(step.name, {})})
+    return data
+
+
+def _filled(step: FilledStep, data: bytes, counts: Mapping[str, int]) -> bytes:
+    """The bytes of a number that follows from those before it."""
+    return step.integer.pack(step.value(data[step.begin.value(counts) : step.end.value(counts)]))
 
 
 def _sizes(plan: PayloadPlan, values: Mapping[str, Raw]) -> dict[str, dict[str, int]]:
@@ -205,7 +226,7 @@ def defaults(plan: PayloadPlan) -> dict[str, Raw]:
     return by_value(plan, {each.name: default_of(each) for each in plan.settable})
 
 
-def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) -> bytes:
+def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) -> bytes:  # noqa: C901  # a case a step
     match step:
         case ValueStep():
             return step.integer.pack(_checked(step.name, step.number, values[step.name]))
@@ -216,6 +237,8 @@ def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) ->
             if number > step.integer.maximum:
                 raise Unsendable(step.run, values[step.run])
             return step.integer.pack(number)
+        case FilledStep():
+            raise AssertionError(f"{step.name} follows from other bytes")
         case BitsStep():
             pattern = sum(member_bits(member, values) << member.shift for member in step.members)
             return step.integer.pack(step.integer.signed_value(pattern))
@@ -320,8 +343,22 @@ def unpack(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
     values: dict[str, Raw] = {}
     for step in plan.steps:
         at = step.place.front.value(counts)
-        values |= _unpacked(step, payload[at:], counts, at)
+        if isinstance(step, FilledStep):
+            _verify(step, payload, at, 0, counts)
+        else:
+            values |= _unpacked(step, payload[at:], counts, at)
     return values
+
+
+def right(step: FilledStep, payload: bytes, start: int, counts: Mapping[str, int]) -> int:
+    """What a filled number must be; ``start`` is the offset that its places count from."""
+    return step.value(payload[start + step.begin.value(counts) : start + step.end.value(counts)])
+
+
+def _verify(step: FilledStep, payload: bytes, at: int, start: int, counts: Mapping[str, int]) -> None:
+    """Compare a filled number with the bytes that it follows from. Raises BadContent."""
+    if step.integer.unpack(payload[at : at + step.integer.size]) != right(step, payload, start, counts):
+        raise BadContent(step.fault, step.name, at)
 
 
 def _unpack_walked(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
@@ -331,6 +368,8 @@ def _unpack_walked(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
             own = values.of(each.inside)
             if each.walked and each.data is not None:
                 own.setdefault(each.step.name, [])  # an array without records
+            elif isinstance(each.step, FilledStep):
+                _verify_at(each, each.step, payload)
             elif each.data is None:
                 own |= {holder.name: None for holder in holders((each.step,))}
             else:
@@ -360,6 +399,13 @@ class _Values:
                 outer[name] = array = self._arrays.setdefault((inside[:-1], name), [])
                 array.append(self._records[inside])
         return self._records[inside]
+
+
+def _verify_at(visit: walk.Visit, step: FilledStep, payload: bytes) -> None:
+    try:
+        _verify(step, payload, visit.at, visit.at - step.place.front.fixed, {})
+    except BadContent as bad:
+        raise BadContent(bad.kind, visit.prefix + bad.field, bad.offset) from None
 
 
 def _unpacked_at(visit: walk.Visit, data: bytes) -> dict[str, Raw]:
@@ -464,7 +510,7 @@ def _number(count: CountStep, payload: bytes, counts: Mapping[str, int]) -> int:
     return count.integer.unpack(data)
 
 
-def _unpacked(step: Step, data: bytes, counts: Mapping[str, int], at: int) -> dict[str, Raw]:
+def _unpacked(step: Step, data: bytes, counts: Mapping[str, int], at: int) -> dict[str, Raw]:  # noqa: C901  # a case a step
     """The values of the step at the beginning of ``data``."""
     match step:
         case ValueStep():
@@ -486,6 +532,8 @@ def _unpacked(step: Step, data: bytes, counts: Mapping[str, int], at: int) -> di
             return {step.name: _unpacked_records(step, data, counts, at)}
         case ReservedStep():
             pass
+        case FilledStep():
+            raise AssertionError(f"{step.name} follows from other bytes")
         case _:
             assert_never(step)
     return {}

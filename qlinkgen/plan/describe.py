@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from decimal import Decimal
 from fractions import Fraction
 from typing import assert_never
@@ -10,8 +11,10 @@ from qlinkgen.model.condition import Test
 from qlinkgen.model.frame import Silence
 from qlinkgen.model.integer import Chunk, Integer
 from qlinkgen.model.types import (
+    Checked,
     Constant,
     Count,
+    Derived,
     Enum,
     Flags,
     Float,
@@ -62,6 +65,8 @@ from qlinkgen.plan.payload import (
     Compare,
     ConstantStep,
     CountStep,
+    Equal,
+    FilledStep,
     Infer,
     ItemsStep,
     Learn,
@@ -107,10 +112,11 @@ def range_text(scalar: Scalar) -> str:
     """Legal values in the unit; "" for a bool, enum or flags without limits."""
     match scalar.role:
         case Constant():
-            return f"always {number_text(scalar.physical(scalar.default))}"
+            others = "".join(f" or {number_text(scalar.physical(each))}" for each in scalar.role.accepted)
+            return f"always {number_text(scalar.physical(scalar.default))}{others}"
         case Reserved():
             return "reserved"
-        case Settable() | Count():
+        case Settable() | Count() | Checked() | Derived():
             return "" if _is_free(scalar) else limits_text(scalar)
         case _:
             assert_never(scalar.role)
@@ -162,7 +168,7 @@ def number_of(step: Step | Member) -> Scalar | None:
     match step:
         case ValueStep() | ConstantStep() | ReservedStep() | ItemsStep() | Member():
             return step.number
-        case CountStep() | BitsStep() | BytesStep() | RecordStep() | RecordsStep():
+        case CountStep() | FilledStep() | BitsStep() | BytesStep() | RecordStep() | RecordsStep():
             return None
         case _:
             assert_never(step)
@@ -173,7 +179,7 @@ def type_text(step: Step | Member) -> str:
     match step:
         case ValueStep() | ConstantStep() | ReservedStep() | Member():
             return _scalar_text(step.number)
-        case CountStep() | BitsStep():
+        case CountStep() | FilledStep() | BitsStep():
             return integer_text(step.integer)
         case BytesStep():
             pad = f" padded with {step.pad.hex().upper()}" if step.pad else ""
@@ -234,6 +240,8 @@ def holds_text(step: Step | Member) -> str:
             return range_text(step.number)
         case CountStep():
             return f"{count_unit(step)} of {counted_text(step)}"
+        case FilledStep():
+            return filled_text(step)
         case BitsStep():
             return span_text(step.integer.minimum, step.integer.maximum)
         case BytesStep() | RecordStep() | RecordsStep():
@@ -242,7 +250,7 @@ def holds_text(step: Step | Member) -> str:
             assert_never(step)
 
 
-def kind_text(step: Step | Member) -> str:
+def kind_text(step: Step | Member) -> str:  # noqa: C901  # a case a step
     """The kind of a step, in a word."""
     match step:
         case ValueStep() | Member():
@@ -253,6 +261,8 @@ def kind_text(step: Step | Member) -> str:
             return "reserved"
         case CountStep():
             return "count"
+        case FilledStep():
+            return "derived" if isinstance(step.rule, Equal) else "check"
         case BitsStep():
             return "bits"
         case BytesStep():
@@ -275,7 +285,9 @@ def must_text(step: Step | Member) -> str:
         case ValueStep() | ItemsStep() | Member():
             return " and ".join(map(condition_text, step.conditions))
         case ConstantStep():
-            return str(step.value)
+            return constant_text(step)
+        case FilledStep():
+            return filled_text(step)
         case ReservedStep():
             return f"anything; sent as {step.value}"
         case CountStep():
@@ -286,6 +298,30 @@ def must_text(step: Step | Member) -> str:
             return "7-bit characters" if step.text else ""
         case _:
             assert_never(step)
+
+
+def constant_text(step: ConstantStep) -> str:
+    """The numbers that a receiver accepts, the one that is sent first."""
+    return " or ".join(map(str, (step.value, *step.accepted)))
+
+
+def filled_text(step: FilledStep) -> str:
+    """What a number follows from: ``crc-8/nrsc-5 over value``, ``~count``, ``count + 1``."""
+    rule, over = step.rule, step.over
+    if not isinstance(rule, Equal):
+        return f"{rule.name} over {span_names(over)}"
+    added = f" {'+' if rule.added > 0 else '-'} {abs(rule.added)}" if rule.added else ""
+    return f"{'~' if rule.inverted else ''}{over[0]}{added}"
+
+
+def span_names(names: Sequence[str]) -> str:
+    """Names of fields that follow each other: ``a``, ``a, b``, ``a .. f``."""
+    return ", ".join(names) if len(names) <= 3 else f"{names[0]} .. {names[-1]}"
+
+
+def filled_number(step: FilledStep, number: int) -> str:
+    """A number that follows from others in hex, with all digits of its width."""
+    return f"0x{number:0{(step.integer.bits + 3) // 4}X}"
 
 
 def count_unit(step: CountStep) -> str:

@@ -569,7 +569,9 @@ class _Walk:
         end = places[-1] + 1 if places else self.cursor.at
         for each in fields.wrong:
             place = places[each.at] if each.at < len(places) else end  # a zero that was not sent
-            self.faults.append(Fault("range", Rule.VALUE, place, each.of, each.seen, each.inside))
+            self.faults.append(
+                Fault(each.kind, Rule.VALUE, place, each.of, each.seen, each.inside, each.right)
+            )
         for span in fields.spans:
             own, raw = self._sent(places[at] for at in span.places if at < len(places))
             if own:

@@ -96,9 +96,9 @@ class Rescan:
     verified: bool
     seeded: bool = False
 
-    def proves(self, kind: str) -> bool:
-        """Whether a frame with a fault of this kind is certain to be one."""
-        return self.verified and kind != "crc" and not (self.seeded and kind == "unknown")
+    def proves(self, kind: str, *, inside: bool) -> bool:
+        """Whether a frame with a fault of this kind is certain to be one; ``inside``: in a field of it."""
+        return self.verified and (inside or kind != "crc") and not (self.seeded and kind == "unknown")
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,6 +53,10 @@ class Size:
         """This size with a term for one more run."""
         return Size(self.fixed, (*self.terms, term))
 
+    def since(self, other: Size) -> Size:
+        """What this size adds to another one, which it begins with."""
+        return Size(self.fixed - other.fixed, self.terms[len(other.terms) :])
+
     def value(self, counts: Mapping[str, int]) -> int:
         """The size in bytes for the given number of items of each run."""
         return self.fixed + sum(term.value(counts[term.run]) for term in self.terms)

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from typing import assert_never
 
 from qlinkgen.model.integer import Integer
-from qlinkgen.plan.content import BadContent, broken, count_items, unpack_items
+from qlinkgen.plan.content import BadContent, broken, count_items, right, unpack_items
 from qlinkgen.plan.expr import Condition
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
     ConstantStep,
     CountStep,
+    FilledStep,
     ItemsStep,
     Learn,
     Member,
@@ -36,12 +37,22 @@ from qlinkgen.plan.walk import Wrong as WrongSize
 
 @dataclass(frozen=True, slots=True)
 class Wrong:
-    """An illegal value of a field, its offset in the payload, and the record that it is inside of."""
+    """An illegal value of a field, its offset in the payload, and the record that it is inside of.
+
+    Attributes:
+        right: the only legal number, if it follows from other bytes.
+    """
 
     of: Step | Member
     seen: int
     at: int
     inside: str = ""
+    right: int | None = None
+
+    @property
+    def kind(self) -> str:
+        """The kind of fault."""
+        return self.of.fault if isinstance(self.of, FilledStep) else "range"
 
 
 class Fields:
@@ -63,6 +74,7 @@ class Fields:
         self.bad = False
         self.spans: list[Span] = []
         self.wrong: list[Wrong] = []
+        self._counts: Mapping[str, int] = {}
         counts: Mapping[str, int] = {}
         if plan.walked:
             self._judging = judging and sound
@@ -135,7 +147,7 @@ class Fields:
         self.spans[spans:] = [replace(each, inside=inside + each.inside) for each in self.spans[spans:]]
         self.wrong[wrong:] = [replace(each, inside=inside + each.inside) for each in self.wrong[wrong:]]
 
-    def _step(self, step: Step, places: tuple[int, ...], size: int) -> None:
+    def _step(self, step: Step, places: tuple[int, ...], size: int) -> None:  # noqa: C901  # a case a step
         raw = bytes(self._payload[at] for at in places)
         if isinstance(step, RecordStep | RecordsStep):
             self._records(step, places)
@@ -150,6 +162,8 @@ class Fields:
                 self._integer(step, step.integer, step.conditions, places)
             case CountStep():
                 self._learn(step, self._integer(step, step.integer, (), places))
+            case FilledStep():
+                self._filled(step, places, step.integer.unpack(raw))
             case ReservedStep():
                 self._span(step, places, step.integer.unpack(raw))
             case BitsStep():
@@ -178,6 +192,16 @@ class Fields:
             own = tuple(places[at] for at in span.places)
             self.spans.append(replace(span, places=own, inside=name + span.inside))
         self.wrong += (replace(each, at=places[each.at], inside=name + each.inside) for each in inner.wrong)
+
+    def _filled(self, step: FilledStep, places: tuple[int, ...], number: int) -> None:
+        """Add a number that follows from other bytes, which have been divided before."""
+        start = places[0] - step.place.front.fixed if self._plan.walked else 0
+        wanted = right(step, self._payload, start, self._counts) if self._judging else number
+        wrong = number != wanted
+        if wrong:
+            self.wrong.append(Wrong(step, number, places[0], right=wanted))
+        raw = bytes(self._payload[at] for at in places)
+        self.spans.append(Span(step, places, raw, len(places), number, step.fault if wrong else ""))
 
     def _learn(self, step: CountStep, number: int) -> None:
         if any(isinstance(each, Learn) and each.count is step for each in self._plan.sizing):

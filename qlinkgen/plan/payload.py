@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import assert_never
+from typing import Literal, assert_never
 
+from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.condition import Test, turning_points
 from qlinkgen.model.integer import BitOrder, Integer
 from qlinkgen.model.types import (
@@ -92,11 +93,15 @@ class ConstantStep:
     value: int
     number: Scalar
     presence: Presence | None = None
+    #: Other values that receivers accept.
+    accepted: tuple[int, ...] = ()
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
         """Conditions on the integer on the wire."""
-        return (Within(self.value, self.value),)
+        if not self.accepted:
+            return (Within(self.value, self.value),)
+        return (OneOf(tuple(Within(each, each) for each in sorted((self.value, *self.accepted)))),)
 
 
 @dataclass(frozen=True)
@@ -141,6 +146,54 @@ class CountStep:
         if self.term.packed:
             return self.term.items_in(number)
         return None if (number - self.term.more) % self.scale else self.term.items_in(number)
+
+
+@dataclass(frozen=True, slots=True)
+class Equal:
+    """The rule of a number derived from another one.
+
+    Attributes:
+        source: the layout of the other one.
+    """
+
+    source: Integer
+    inverted: bool
+    added: int
+
+    def compute(self, data: bytes) -> int:
+        """The number for the bytes of the other one; it may exceed its bits."""
+        number = self.source.unpack(data)
+        return (~number if self.inverted else number) + self.added
+
+
+@dataclass(frozen=True)
+class FilledStep:
+    """An integer that follows from earlier bytes; filled by the codec.
+
+    Attributes:
+        begin: offset of these bytes, counted as in the place of the step.
+        end: offset of their end.
+        over: the fields that they are.
+        rule: how it follows from them: a check value, or a number derived from another.
+    """
+
+    name: str
+    place: Place
+    integer: Integer
+    begin: Size
+    end: Size
+    over: tuple[str, ...]
+    rule: Checksum | Equal
+    presence: Presence | None = None
+
+    @property
+    def fault(self) -> Literal["crc", "range"]:
+        """The kind of fault of a wrong one."""
+        return "range" if isinstance(self.rule, Equal) else "crc"
+
+    def value(self, data: bytes) -> int:
+        """The number for the bytes that it follows from."""
+        return self.rule.compute(data) & self.integer.mask
 
 
 @dataclass(frozen=True)
@@ -334,7 +387,9 @@ class RecordsStep:
 
 
 #: A value that is a number, or a run of bytes or of numbers.
-SimpleStep = ValueStep | ConstantStep | ReservedStep | CountStep | BitsStep | BytesStep | ItemsStep
+SimpleStep = (
+    ValueStep | ConstantStep | ReservedStep | CountStep | FilledStep | BitsStep | BytesStep | ItemsStep
+)
 RunStep = BytesStep | ItemsStep | RecordsStep
 Step = SimpleStep | RecordStep | RecordsStep
 #: A step or member with a value of the message.
@@ -526,7 +581,7 @@ def holders(steps: Iterable[Step]) -> tuple[Holder, ...]:
                 found.append(step)
             case BitsStep():
                 found += step.members
-            case ConstantStep() | ReservedStep() | CountStep():
+            case ConstantStep() | ReservedStep() | CountStep() | FilledStep():
                 pass
             case _:
                 assert_never(step)
@@ -567,7 +622,7 @@ def full_size(step: Step) -> int:
 def least_size(step: Step) -> int:
     """Minimum size of a step, if it is present."""
     match step:
-        case ValueStep() | ConstantStep() | ReservedStep() | CountStep() | BitsStep():
+        case ValueStep() | ConstantStep() | ReservedStep() | CountStep() | FilledStep() | BitsStep():
             return step.integer.size
         case BytesStep() | ItemsStep():
             return term_of(step).value(step.length.minimum)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import assert_never
 
+from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.fields import Field, FieldType, Layout, Record, Records, greatest_size
 from qlinkgen.model.message import Message
 from qlinkgen.model.types import (
@@ -13,8 +14,10 @@ from qlinkgen.model.types import (
     BitField,
     Bits,
     Blob,
+    Checked,
     Constant,
     Count,
+    Derived,
     Length,
     Reserved,
     Scalar,
@@ -27,6 +30,8 @@ from qlinkgen.plan.payload import (
     Compare,
     ConstantStep,
     CountStep,
+    Equal,
+    FilledStep,
     Infer,
     ItemsStep,
     Learn,
@@ -67,6 +72,8 @@ class _Planner:
         self._all = fields
         self._limit = limit
         self._fields = {field.name: field for field in fields}
+        #: Offsets of the fields so far and of their ends; those of a segment in a walked payload.
+        self._spans: dict[str, tuple[Size, Size]] = {}
 
     def plan(self, *, empty_is_default: bool = False) -> PayloadPlan:
         """The plan of the fields."""
@@ -77,7 +84,9 @@ class _Planner:
             rest = self._all[index:]
             back = sum(each.max_size for each in rest) if all(each.fixed for each in rest) else None
             steps.append(self._step(field, Place(front, back)))
-            front = front + field.max_size if field.fixed else front.plus(_term(field.name, field.type))
+            end = front + field.max_size if field.fixed else front.plus(_term(field.name, field.type))
+            self._spans[field.name] = (front, end)
+            front = end
         return PayloadPlan(
             steps=tuple(steps),
             sizing=tuple(self._sizing(steps, front)),
@@ -121,6 +130,7 @@ class _Planner:
         for index, field in enumerate(self._all):
             if field.fixed:
                 steps.append(self._step(field, Place(Size(size), None)))
+                self._spans[field.name] = (Size(size), Size(size + field.max_size))
                 size += field.max_size
                 continue
             if steps:
@@ -182,8 +192,8 @@ class _Planner:
         match scalar.role:
             case Settable():
                 return ValueStep(name, place, scalar.integer, scalar)
-            case Constant():
-                return ConstantStep(name, place, scalar.integer, scalar.default, scalar)
+            case Constant(accepted):
+                return ConstantStep(name, place, scalar.integer, scalar.default, scalar, accepted=accepted)
             case Reserved():
                 return ReservedStep(name, place, scalar.integer, scalar.default, scalar)
             case Count(run, unit, beside):
@@ -199,8 +209,23 @@ class _Planner:
                     most = most if self._limit is None else min(most, self._limit)
                     bounds = Within(more + least, min(scalar.integer.maximum, more + most))
                 return CountStep(name, place, scalar.integer, run, term, bounds, sized=sized)
+            case Checked(algorithm, first, last):
+                return self._filled(name, scalar, place, (first, last), algorithm)
+            case Derived(of, inverted, added):
+                kind = self._fields[of].type
+                assert isinstance(kind, Scalar | Bits)
+                source = (kind.container if isinstance(kind, Bits) else kind).integer
+                return self._filled(name, scalar, place, (of, of), Equal(source, inverted, added))
             case _:
                 assert_never(scalar.role)
+
+    def _filled(
+        self, name: str, scalar: Scalar, place: Place, over: tuple[str, str], rule: Checksum | Equal
+    ) -> FilledStep:
+        names, first, last = list(self._fields), *over
+        covered = tuple(names[names.index(first) : names.index(last) + 1])
+        begin, end = self._spans[first][0], self._spans[last][1]
+        return FilledStep(name, place, scalar.integer, begin, end, covered, rule)
 
     def _sizing(self, steps: list[Step], size: Size) -> Iterator[Sizing]:
         """In wire order: the count of a run precedes it, and lint rejects a count after an uncounted run."""
@@ -214,7 +239,7 @@ class _Planner:
                     if not step.fixed and not step.length.counted_by:
                         others = Size(size.fixed, tuple(term for term in size.terms if term.run != step.name))
                         yield Infer(step, others)
-                case ValueStep() | ConstantStep() | ReservedStep() | BitsStep() | RecordStep():
+                case ValueStep() | ConstantStep() | ReservedStep() | FilledStep() | BitsStep() | RecordStep():
                     pass
                 case _:
                     assert_never(step)

@@ -29,6 +29,7 @@ class Event:
         offset: offset of its first byte in the stream.
         raw: its bytes as received.
         decoded: the message, None for a fault.
+        inside: the fault is in a field, so the frame around it is right.
     """
 
     kind: str
@@ -36,6 +37,7 @@ class Event:
     offset: int
     raw: bytes
     decoded: Decoded | None = None
+    inside: bool = False
 
 
 class Receiver:
@@ -94,7 +96,7 @@ class Receiver:
         try:
             decoded = self.codec.judge(taken, self.direction, request)
         except BadFrame as bad:
-            return Event(bad.kind, self._at, offset, raw)
+            return Event(bad.kind, self._at, offset, raw, inside=bool(bad.field))
         return Event("message", self._at, offset, raw, decoded)
 
 
@@ -248,7 +250,7 @@ class RescanningReceiver(Receiver):
         event = self.judged(taken, raw, self._start)
         strategy = taken.frame.receiver if taken.frame else self._strategy
         assert isinstance(strategy, Rescan)
-        proven = strategy.proves(event.kind)
+        proven = strategy.proves(event.kind, inside=event.inside)
         if event.kind != "message" and not proven:
             yield from self._drop(event.kind, raw)
             return

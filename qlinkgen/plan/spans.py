@@ -111,6 +111,7 @@ class Fault:
         of: the wrong part, step or member, None for the frame.
         seen: the wrong number, see `Rule`.
         inside: as in `Span`.
+        right: the only legal number of a field that follows from others, None for others.
     """
 
     kind: str
@@ -119,6 +120,7 @@ class Fault:
     of: Part | Step | Member | None = None
     seen: int | None = None
     inside: str = ""
+    right: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from qlinkgen.plan.payload import (
     BytesStep,
     ConstantStep,
     CountStep,
+    FilledStep,
     ItemsStep,
     PayloadPlan,
     Presence,
@@ -157,7 +158,9 @@ class Walk:
                     self._note(member.name, integer.signed_value(whole >> member.shift & integer.mask))
             case CountStep():
                 self._count(step, step.integer.unpack(data), at)
-            case ConstantStep() | ReservedStep() | BytesStep() | ItemsStep() | RecordStep() | RecordsStep():
+            case ConstantStep() | ReservedStep() | FilledStep() | BytesStep() | ItemsStep():
+                pass
+            case RecordStep() | RecordsStep():
                 pass
             case _:
                 assert_never(step)
@@ -189,7 +192,9 @@ class Walk:
                 return any(member.name in self._tested for member in step.members)
             case CountStep():
                 return step.run not in (self._sizes if step.sized else self.counts)
-            case ConstantStep() | ReservedStep() | BytesStep() | ItemsStep() | RecordStep() | RecordsStep():
+            case ConstantStep() | ReservedStep() | FilledStep() | BytesStep() | ItemsStep():
+                return False
+            case RecordStep() | RecordsStep():
                 return False
             case _:
                 assert_never(step)

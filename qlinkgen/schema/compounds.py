@@ -25,8 +25,10 @@ _NUMBER_KEYS = (
     "bits",
     "packed",
     "as",
+    "algorithm",
+    "equals",
 )
-_WHOLE_KEYS = ("const", "reserved", "counts", "bits")
+_WHOLE_KEYS = ("const", "reserved", "counts", "bits", "algorithm", "equals")
 _CONTAINER_KEYS = (
     "packed",
     "as",
@@ -39,6 +41,8 @@ _CONTAINER_KEYS = (
     "reserved",
     "counts",
     "unit",
+    "algorithm",
+    "equals",
 )
 
 

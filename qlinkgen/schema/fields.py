@@ -13,6 +13,7 @@ from qlinkgen.schema.counted import with_counts
 from qlinkgen.schema.counting import of_choice, with_beside
 from qlinkgen.schema.file_fields import Fields, FieldSpec, RecordSpec
 from qlinkgen.schema.file_model import SchemaFile
+from qlinkgen.schema.filled import FilledBuilder
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import shown, type_text
 from qlinkgen.schema.records import RecordBuilder
@@ -57,6 +58,7 @@ class FieldBuilder:
         fields = with_beside(fields, specs, path, self._report)
         fields = ConditionBuilder(specs, path, self._report, separated=separated).build(fields)
         fields = self._counted(fields, path, asked)
+        fields = FilledBuilder(specs, path, self._report).build(fields)
         if not separated:
             self._check_open_ends(fields, path)
         self._check_mixed(fields, path)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Discriminator, Field, PrivateAttr, StrictBool, StrictInt, Tag
 
+from qlinkgen.schema.file_algorithms import AnyAlgorithm
 from qlinkgen.schema.file_base import BRANCH, Fact, FileMapping, Lifetime, Names
 from qlinkgen.schema.kinds import (
     AnyCondition,
@@ -126,7 +127,20 @@ class FieldSpec(Fact, Lifetime):
     range: AnyRange | None = Field(default=None, description="Legal values, in the unit")
     raw_range: AnyRange | None = Field(default=None, description="Legal values, as integers on the wire")
     default: ScalarValue | None = Field(default=None, description="Default value, in the unit")
-    const: ScalarValue | None = Field(default=None, description="Always sent, and required when received")
+    const: ScalarValue | None = Field(
+        default=None, description="Always sent, and required when received; of several, the first is sent"
+    )
+    algorithm: AnyAlgorithm | None = Field(
+        default=None,
+        description="A check value: name of a CRC in the catalogue or of a sum, or its parameters",
+    )
+    init: Id | None = Field(default=None, description="Start of the check value, if not the algorithm's")
+    over: list[str] | None = Field(
+        default=None, description="Earlier fields, one after the other, that a check value covers"
+    )
+    equals: str | None = Field(
+        default=None, description="Earlier field with the same value; ~FIELD, FIELD + N: derived from it"
+    )
     reserved: StrictBool = Field(default=False, description="Sent as zero (or const), ignored when received")
     counts: Annotated[Names, Field(min_length=1)] | None = Field(
         default=None,

@@ -20,6 +20,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from qlinkgen.schema.file_algorithms import AnyAlgorithm
 from qlinkgen.schema.file_base import BRANCH, Fact, FileMapping, Names
 from qlinkgen.schema.file_fields import BitSpec
 from qlinkgen.schema.kinds import (
@@ -77,32 +78,6 @@ def _both(values: dict[str, int]) -> dict[str, int]:
 
 Directions = Annotated[
     dict[Name, Id], AfterValidator(_both), Field(json_schema_extra={"required": ["request", "response"]})
-]
-
-
-class CrcSpec(FileMapping):
-    """A CRC by its parameters, which have the meaning of the catalogue."""
-
-    width: Annotated[StrictInt, Field(ge=8, le=64)] = Field(description="Bits of the CRC")
-    poly: Id = Field(description="Polynomial without its highest term")
-    init: Id = Field(default=0, description="Initial register")
-    refin: StrictBool = Field(default=False, description="Bytes are processed low bit first")
-    refout: StrictBool | None = Field(
-        default=None, description="The final register is reflected; default: as refin"
-    )
-    xorout: Id = Field(default=0, description="XORed with the result")
-    check: Id | None = Field(
-        default=None, description="CRC of the characters 123456789, if the document states it"
-    )
-
-
-def _algorithm_form(value: object) -> str:
-    return f"{BRANCH}crc" if isinstance(value, dict | CrcSpec) else f"{BRANCH}name"
-
-
-AnyAlgorithm = Annotated[
-    Annotated[CrcSpec, Tag(f"{BRANCH}crc")] | Annotated[str, Tag(f"{BRANCH}name")],
-    Discriminator(_algorithm_form),
 ]
 
 

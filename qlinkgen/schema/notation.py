@@ -25,6 +25,10 @@ _DURATION = re.compile(
 )
 _TYPE = re.compile(r"\s*(?P<base>[A-Za-z_][\w.]*)\s*(?:\[(?P<count>[^\]]*)\])?\s*\Z", re.ASCII)
 _VERSION = re.compile(r"[0-9]{1,9}(?:\.[0-9]{1,9}){0,5}\Z", re.ASCII)
+#: A number derived from another one: NAME, ~NAME, NAME + 1.
+DERIVED = re.compile(
+    r"\s*(?P<not>~?)\s*(?P<name>[a-z][a-z0-9_]*)\s*(?P<added>[-+]\s*[0-9]{1,20})?\s*\Z", re.ASCII
+)
 _SECONDS = {"us": Fraction(1, 10**6), "ms": Fraction(1, 1000), "s": Fraction(1)}
 _MAX_POWER = 128
 _MAX_SHOWN = 60

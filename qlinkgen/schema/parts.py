@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.frame import ATTRIBUTE, Checksum, Derivation, Part, Role, Silence
 from qlinkgen.model.types import Chunk, Scalar, byte_chunks
-from qlinkgen.schema.file_frames import CrcSpec, PartKind, PartSpec
+from qlinkgen.schema.algorithms import AlgorithmBuilder
+from qlinkgen.schema.file_frames import PartKind, PartSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
-from qlinkgen.schema.notation import Duration, shown
+from qlinkgen.schema.notation import DERIVED, Duration, shown
 from qlinkgen.schema.part_directions import direction_of
 from qlinkgen.schema.pieces import PieceBuilder, text_size
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -67,11 +67,6 @@ _KEYS = (
     "words",
     "rejected",
     *_VALUE_KEYS,
-)
-
-
-_DERIVED = re.compile(
-    r"\s*(?P<not>~?)\s*(?P<part>[a-z][a-z0-9_]*)\s*(?P<added>[-+]\s*[0-9]{1,20})?\s*\Z", re.ASCII
 )
 
 
@@ -225,21 +220,21 @@ class PartBuilder:
         return spec.value or (spec.text or "\0").encode("ascii")
 
     def _derivation(self, spec: PartSpec, names: Iterable[str], path: Path) -> Derivation:
-        match = _DERIVED.match(spec.equals or "")
+        match = DERIVED.match(spec.equals or "")
         order, name = list(names), path[-1]
         if match is None:
             what, hint = (
                 f"{shown(spec.equals)} does not name a part",
                 "write PART, ~PART, PART + N or PART - N",
             )
-        elif match["part"] not in order:
-            hint = did_you_mean(match["part"], order, f"the parts are {listed(order)}")
-            what = f"unknown part {shown(match['part'])}"
-        elif order.index(match["part"]) >= order.index(str(name)):
-            what, hint = f"{match['part']} does not precede {name}", f"move {name} after it"
+        elif match["name"] not in order:
+            hint = did_you_mean(match["name"], order, f"the parts are {listed(order)}")
+            what = f"unknown part {shown(match['name'])}"
+        elif order.index(match["name"]) >= order.index(str(name)):
+            what, hint = f"{match['name']} does not precede {name}", f"move {name} after it"
         else:
             return Derivation(
-                match["part"], bool(match["not"]), int((match["added"] or "0").replace(" ", ""))
+                match["name"], bool(match["not"]), int((match["added"] or "0").replace(" ", ""))
             )
         self._report.error("unknown-part", (*path, "equals"), what, hint)
         self._report.taint(path)
@@ -311,7 +306,7 @@ class PartBuilder:
 
     def checksum(self, spec: PartSpec, names: Iterable[str], path: Path) -> Checksum | None:
         """The checksum of a frame; None if its algorithm is unknown."""
-        algorithm = self._begun(self._algorithm(spec, path), spec.init if self._crc is None else None, path)
+        algorithm = self._algorithm(spec, path)
         covered = [name for name in names if name != path[-1]]
         if not spec.over:
             self._lacks("over", "add over: [PART, ...]", path)
@@ -340,19 +335,13 @@ class PartBuilder:
             self._report.error("value-does-not-fit", (*path, "otherwise"), what, f"use 0..{algorithm.mask}")
         return spec.otherwise
 
-    def _begun(
-        self, algorithm: catalogue.Checksum | None, init: int | None, path: Path
-    ) -> catalogue.Checksum | None:
-        """The algorithm with the initial register of the part."""
-        if algorithm is None or init is None:
-            return algorithm
-        try:
-            return catalogue.begun(algorithm, init)
-        except ValueError:
-            what = f"{init:#x} does not fit {algorithm.width} bits"
-            hint = f"use 0..{algorithm.mask:#x}"
-            self._report.error("value-does-not-fit", (*path, "init"), what, hint)
-            return algorithm
+    def _algorithm(self, spec: PartSpec, path: Path) -> catalogue.Checksum | None:
+        name = self._crc or spec.algorithm
+        if name is None:
+            self._lacks("algorithm", "add algorithm: crc-16/ibm-3740 or another", path)
+            return None
+        builder = AlgorithmBuilder(self._report, replaced=self._crc is not None)
+        return builder.build(name, spec.init if self._crc is None else None, path)
 
     def _sent(self, spec: PartSpec, scalar: Scalar, path: Path) -> tuple[Chunk, ...]:
         if spec.as_ is not None:
@@ -384,59 +373,6 @@ class PartBuilder:
             what = f"a checksum of {scalar.bits} bits is not {shown(spec.as_)}"
             self._report.error("bad-digits", (*path, "as"), what, f"write as: {right}", needs=(path,))
         return tuple(Chunk(shift, 4) for shift in range(scalar.bits - 4, -1, -4))
-
-    def _ambiguous(self, name: str, found: catalogue.Checksum | None, path: Path) -> bool:
-        """Report an ambiguous name; ``found`` is what it was taken as."""
-        candidates = catalogue.candidates(name)
-        if candidates:
-            what = f"{shown(name)} is ambiguous" + (f" and was taken as {found.name}" if found else "")
-            names = listed((f"{each.name} ({each.check:0{each.width // 4}X})" for each in candidates), "or")
-            hint = f"write the one whose check value for 123456789 matches the document: {names}"
-            rule = "ambiguous-algorithm" if found else "unknown-algorithm"
-            self._report.error(rule, (*path, "algorithm"), what, hint, of_key=self._crc is not None)
-        return bool(candidates)
-
-    def _algorithm(self, spec: PartSpec, path: Path) -> catalogue.Checksum | None:
-        name = self._crc or spec.algorithm
-        if name is None:
-            self._lacks("algorithm", "add algorithm: crc-16/ibm-3740 or another", path)
-            return None
-        if isinstance(name, CrcSpec):
-            return self._parameters(name, (*path, "algorithm"))
-        try:
-            found = catalogue.find(name[:80])
-            self._ambiguous(name, found, path)
-            return found
-        except catalogue.UnknownAlgorithm as error:
-            if self._ambiguous(name, None, path):
-                return None
-            hint = "see the catalogue of CRC algorithms, or use sum8, xor8 or another sum"
-            if error.suggestions:
-                hint = f"did you mean {listed(map(repr, error.suggestions), 'or')}?"
-            place = (*path, "algorithm")
-            what = f"unknown checksum algorithm {shown(name)}"
-            self._report.error("unknown-algorithm", place, what, hint, of_key=self._crc is not None)
-            return None
-
-    def _parameters(self, spec: CrcSpec, path: Path) -> catalogue.Algorithm | None:
-        """The CRC with parameters of its own."""
-        refout = spec.refin if spec.refout is None else spec.refout
-        try:
-            found = catalogue.stated(
-                spec.width, spec.poly, spec.init, refin=spec.refin, refout=refout, xorout=spec.xorout
-            )
-        except ValueError as error:
-            what, hint = str(error).partition(": ")[2], "correct it"
-            if "poly" in what:
-                hint = "write it unreflected and without its highest term, like 0x1021"
-            self._report.error("crc-parameters", path, what, hint)
-            return None
-        if spec.check is not None and spec.check != found.check:
-            digits = spec.width // 4
-            what = f"the CRC of 123456789 is 0x{found.check:0{digits}X}, not 0x{spec.check:0{digits}X}"
-            hint = "correct a parameter, most often init, refin or xorout"
-            self._report.error("crc-parameters", (*path, "check"), what, hint)
-        return found
 
 
 def _roles(specs: Mapping[str, PartSpec], path: Path) -> Iterator[tuple[str, str, Path]]:

@@ -310,6 +310,13 @@ _ALL = (
         "Messages of one direction have different ids.",
         "A receiver could not distinguish them.",
     ),
+    Rule(
+        "bad-derivation",
+        "A check value or a derived number of a payload follows from fields right before it.",
+        "Encoders fill it in and decoders compare it, so the places of the bytes that it follows from are "
+        "known: fields of the same message or record, one after the other, of constant or counted size. "
+        "It is an unsigned integer of whole bytes.",
+    ),
     Rule("id-does-not-fit", "A message id fits its part of the frame.", "It could not be sent."),
     Rule(
         "bad-addressing",

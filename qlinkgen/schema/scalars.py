@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from fractions import Fraction
 from typing import Literal, assert_never
 
@@ -24,6 +25,7 @@ from qlinkgen.model.types import (
 from qlinkgen.schema.constants import INTEGER, MAX_BITS, MAX_WIDE_BITS, carrier, integer_range
 from qlinkgen.schema.file_fields import FieldSpec
 from qlinkgen.schema.file_model import SchemaFile
+from qlinkgen.schema.filled import is_filled
 from qlinkgen.schema.forms import formed
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import shown
@@ -33,6 +35,8 @@ from qlinkgen.schema.synonyms import type_hint
 
 FIXED = re.compile(r"(?P<sign>u?)fixed(?P<whole>[0-9]{1,2})\.(?P<fraction>[0-9]{1,2})\Z", re.ASCII)
 FLOAT = re.compile(r"f(?P<bits>16|32|64)\Z", re.ASCII)
+#: Keys of numbers that neither check values nor derived ones have.
+_NUMBER_KEYS = ("scale", "offset", "unit", "range", "raw_range", "default", "const", "reserved", "as", "echo")
 #: Built-in types other than integers.
 KEYWORDS = ("bool", "bytes", "text")
 
@@ -162,7 +166,11 @@ class ScalarBuilder:
                 )
         if spec.counts is not None:
             return replace(scalar, role=Count(spec.counts[0], _count_unit(spec), tuple(spec.counts[1:])))
+        if is_filled(spec):
+            return _placed(scalar, spec, plain, location)
         scalar = quantified(scalar, spec, plain.what, location)
+        if isinstance(spec.const, list):
+            return _constants(scalar, spec.const, location)
         key = "const" if spec.const is not None else "default"
         scalar = defaulted(scalar, getattr(spec, key), key, location)
         if spec.reserved:
@@ -219,6 +227,33 @@ class ScalarBuilder:
         return byte_chunks(bits // 8, spec.byteorder or self._file.byteorder)
 
 
+def _placed(scalar: Scalar, spec: FieldSpec, plain: Plain, location: Location) -> Scalar:
+    """The place of a number that follows from other fields, which `filled` adds later."""
+    key = "algorithm" if spec.algorithm is not None else "equals"
+    what = "a check value" if spec.algorithm is not None else "a derived number"
+    others = ("equals",) if spec.algorithm is not None else ()
+    location.reject(spec, (*_NUMBER_KEYS, *others), what)
+    if plain.meaning is not None or plain.scaling is not None or plain.signed or plain.bits > MAX_BITS:
+        hint = f"use an unsigned integer of up to {MAX_BITS} bits"
+        location.fault("bad-derivation", key, f"{spec.type} cannot hold {what}", hint)
+    elif scalar.byteorder is None:
+        location.fault(
+            "bad-derivation", key, f"{what} is not sent in groups", "use an integer of whole bytes"
+        )
+    return replace(scalar, role=Reserved())
+
+
+def _constants(scalar: Scalar, values: list[int | bool | Decimal | str], location: Location) -> Scalar:
+    """A constant of which a receiver accepts several values."""
+    if isinstance(scalar.meaning, Float) or scalar.bits > MAX_BITS or not values:
+        what = "the list of constants is empty" if not values else "such a number has one constant"
+        location.fault("bad-value", "const", what, "write one number")
+        return replace(scalar, role=Constant())
+    sent, *others = (defaulted(scalar, each, "const", location) for each in values)
+    accepted = dict.fromkeys(each.default for each in others if each.default != sent.default)
+    return replace(sent, role=Constant(tuple(accepted)))
+
+
 def _covered(parts: tuple[tuple[int, int], ...], bits: int) -> bool:
     if any(last >= bits for _, last in parts):
         return False
@@ -233,9 +268,18 @@ def _count_unit(spec: FieldSpec) -> Literal["items", "bytes"]:
 def _check_keys(spec: FieldSpec, plain: Plain, location: Location) -> None:
     """Report contradictory keys."""
     if spec.counts is not None:
-        location.reject(
-            spec, ("scale", "offset", "range", "raw_range", "default", "const", "reserved"), "a count"
+        keys = (
+            "scale",
+            "offset",
+            "range",
+            "raw_range",
+            "default",
+            "const",
+            "reserved",
+            "algorithm",
+            "equals",
         )
+        location.reject(spec, keys, "a count")
         if plain.meaning is not None or plain.scaling is not None:
             location.fault("bad-count", "counts", f"{plain.what} cannot count", "use an unsigned integer")
         if len(spec.counts) > 1 and "counts_in" in location.written and spec.counts_in == "items":

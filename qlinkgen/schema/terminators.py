@@ -167,12 +167,16 @@ def bytes_in(field: Field) -> Alphabet:
 
 
 def _bytes_of_number(number: Scalar) -> Alphabet:
-    low, high = number.minimum, number.maximum
     if isinstance(number.role, Constant):
-        low = high = number.default
+        return _joined(_bytes_between(number, each, each) for each in (number.default, *number.role.accepted))
+    low, high = number.minimum, number.maximum
     # A receiver ignores reserved bytes, so another sender may fill them.
-    elif isinstance(number.role, Reserved):
+    if isinstance(number.role, Reserved):
         low, high = number.natural_minimum, number.natural_maximum
+    return _bytes_between(number, low, high)
+
+
+def _bytes_between(number: Scalar, low: int, high: int) -> Alphabet:
     if number.text:
         return number.text.alphabet
     if number.bcd:

@@ -112,6 +112,8 @@ class TypeBuilder:
         """
         location = Location(self._report, path, Location.written_in(spec))
         location.reject(spec, ("last",), "a field that is not an array of records")
+        if spec.algorithm is None:
+            location.reject(spec, ("init", "over"), "a field without algorithm")
         resolved = self._resolve(spec, location, seen)
         kind = self._build(*resolved, location) if resolved else None
         if kind is None:

@@ -80,13 +80,32 @@ class CrcView:
 CheckView = SumView | CrcView
 
 
+def field_check(number: int) -> str:
+    """What the names of the functions of an algorithm of payloads begin with."""
+    return f"field_check_{number}"
+
+
 def render(algorithm: Checksum, number: int = 1) -> CheckView:
     """The check value for the template; users cannot replace an algorithm after the first.
 
     Raises:
         GenerationError: the CRC is not supported.
     """
-    key = "check" if number == 1 else f"check_{number}"
+    if number == 1:
+        return _render("check", algorithm, "CRC")
+    return _render(f"check_{number}", algorithm, f"CRC_{number}")
+
+
+def render_of_fields(algorithm: Checksum, number: int) -> CheckView:
+    """The check value of fields for the template.
+
+    Raises:
+        GenerationError: the CRC is not supported.
+    """
+    return _render(field_check(number), algorithm, f"FIELD_CRC_{number}")
+
+
+def _render(key: str, algorithm: Checksum, macros: str) -> CheckView:
     match algorithm:
         case Sum():
             return _render_sum(key, algorithm, _sum_step(algorithm), finished(algorithm))
@@ -95,7 +114,7 @@ def render(algorithm: Checksum, number: int = 1) -> CheckView:
         case Fletcher():
             return _render_sum(key, algorithm, _fletcher_step(algorithm), "sum")
         case Algorithm():
-            return _render_crc(key, algorithm, "CRC" if number == 1 else f"CRC_{number}")
+            return _render_crc(key, algorithm, macros)
         case _:
             assert_never(algorithm)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import assert_never
 
-from qlinkgen.backends.c import checks
+from qlinkgen.backends.c import checks, filled
 from qlinkgen.backends.c.encode import item_offset, loop, wide_bytes
 from qlinkgen.backends.c.layout import pointer
 from qlinkgen.backends.c.members import count_of, member_of
@@ -20,6 +20,7 @@ from qlinkgen.plan.payload import (
     Compare,
     ConstantStep,
     CountStep,
+    FilledStep,
     Infer,
     ItemsStep,
     Learn,
@@ -122,8 +123,10 @@ class Decoder(Learner):
                 self.reads = True
                 self.refuse([f"payload[{at}] != {octet}" for at, octet in wide_bytes(step, local)], "RANGE")
             case ConstantStep():
-                pattern = unsigned(step.value & step.integer.mask, step.integer.bits, hexadecimal=True)
-                self.refuse([f"{self._get(step.place, step.integer)} != {pattern}"], "RANGE")
+                self.refuse([other_than(step, self._get(step.place, step.integer))], "RANGE")
+            case FilledStep():
+                number = self._get(step.place, step.integer)
+                self.refuse([filled.differs(step, number, self.layouts, local)], step.fault.upper())
             case ReservedStep():
                 pass
             case CountStep():
@@ -166,7 +169,10 @@ class Decoder(Learner):
         self.reads = True
         at, upper = pointer("payload", index_of(place, local, further)), self.layouts.prefix.upper()
         call = f"{self.layouts.records[record.name]}_get_(&{target}, {at})"
-        return checks.refusal([f"{call} != {upper}_OK"], f"{upper}_ERROR_RANGE")
+        if not filled.has_checks(record.payload):
+            return checks.refusal([f"{call} != {upper}_OK"], f"{upper}_ERROR_RANGE")
+        refusal = checks.refusal([f"status != (int){upper}_OK"], "status")
+        return ["{", *(f"    {line}" for line in [f"const int status = {call};", "", *refusal]), "}"]
 
     def _item(self, step: ItemsStep) -> str:
         """The bits of the item at an index."""
@@ -205,3 +211,13 @@ class Decoder(Learner):
         kind, number = count_type(run.length.maximum), local(run.name)
         self.lines.append(f"message->{count_of(run)} = ({kind}){number};")
         return number
+
+
+def other_than(step: ConstantStep, number: str) -> str:
+    """The condition for a number that is none of a constant."""
+    patterns = [
+        unsigned(each & step.integer.mask, step.integer.bits, hexadecimal=True)
+        for each in (step.value, *step.accepted)
+    ]
+    terms = [f"{number} != {each}" for each in patterns]
+    return terms[0] if len(terms) == 1 else " && ".join(f"({each})" for each in terms)

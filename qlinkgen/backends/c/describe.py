@@ -16,6 +16,8 @@ from qlinkgen.plan.payload import (
     BytesStep,
     ConstantStep,
     CountStep,
+    Equal,
+    FilledStep,
     Holder,
     ItemsStep,
     Member,
@@ -88,6 +90,8 @@ def _wire_type(step: Step) -> str:
             role = " reserved"
         case CountStep():
             role = " count"
+        case FilledStep():
+            role = " derived" if isinstance(step.rule, Equal) else " check"
         case _:
             assert_never(step)
     return f"{_integer(step.integer)}{_order(step.integer)}{role}"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import assert_never
 
-from qlinkgen.backends.c import checks
+from qlinkgen.backends.c import checks, filled
 from qlinkgen.backends.c.layout import Layouts, pointer
 from qlinkgen.backends.c.members import count_of, member_of
 from qlinkgen.backends.c.names import count_type, unsigned, unsigned_type
@@ -19,6 +19,7 @@ from qlinkgen.plan.payload import (
     BytesStep,
     ConstantStep,
     CountStep,
+    FilledStep,
     ItemsStep,
     Member,
     PayloadPlan,
@@ -97,7 +98,7 @@ class Encoder:
             case RecordsStep():
                 refusal = self._checked(step.record, f"message->{member_of(step)}[index]")
                 self.lines += self._loop(step, refusal) if refusal else []
-            case ConstantStep() | ReservedStep() | CountStep():
+            case ConstantStep() | ReservedStep() | CountStep() | FilledStep():
                 pass
             case _:
                 assert_never(step)
@@ -123,7 +124,7 @@ class Encoder:
 
     # Bytes
 
-    def _write(self, step: Step) -> None:
+    def _write(self, step: Step) -> None:  # noqa: C901  # a case a step
         match step:
             case ValueStep():
                 self._put(
@@ -140,6 +141,8 @@ class Encoder:
                 number = f"((({number}) + 7U) / 8U)" if step.term.packed else number
                 number = f"({number} + {step.term.more}U)" if step.term.more else number
                 self._put(step.place, step.integer, f"({unsigned_type(step.integer.bits)}){number}")
+            case FilledStep():
+                self._put(step.place, step.integer, filled.right(step, self.layouts, local_size))
             case BitsStep():
                 self._put(step.place, step.integer, _whole(step))
             case BytesStep():

@@ -12,7 +12,7 @@ from qlinkgen.backends import c_text
 from qlinkgen.backends.base import banner
 from qlinkgen.backends.c import dispatch, framing
 from qlinkgen.backends.c.constants import EnumView, enum_views, limits
-from qlinkgen.backends.c.crc import CrcView
+from qlinkgen.backends.c.crc import CrcView, render_of_fields
 from qlinkgen.backends.c.describe import WIDTH
 from qlinkgen.backends.c.example import example_lines, option_lines
 from qlinkgen.backends.c.forms import Helper
@@ -121,7 +121,8 @@ class Header:
             *self._receiver(),
             self._dispatch(),
         ]
-        return tidy(self._place("header", head=self._head(), body="".join(sections)))
+        body = "".join([*self._field_checks(), *sections])
+        return tidy(self._place("header", head=self._head(), body=body))
 
     # Sections
 
@@ -173,6 +174,13 @@ class Header:
             "\n" + self._place("crc" if isinstance(each, CrcView) else "sum", crc=each)
             for each in self._section.algorithms
         )
+
+    def _field_checks(self) -> Iterator[str]:
+        """Algorithms of check values in payloads; complete once the messages have been printed."""
+        for number, algorithm in enumerate(self._layouts.checks, 1):
+            view = render_of_fields(algorithm, number)
+            yield "\n" + self._place("crc" if isinstance(view, CrcView) else "sum", crc=view)
+            yield self._place("check_of", crc=view)
 
     def _directions(self) -> list[str]:
         """Ids and sizes of messages that a receiver needs to find the end of a frame."""
@@ -317,7 +325,7 @@ class Header:
             helpers=self._layouts.helpers(),
             has_text=any(run.text for run in runs),
             has_bytes=bool(runs) or self._copies,
-            has_table=isinstance(check, CrcView),
+            has_table=isinstance(check, CrcView) or any(each.kind == "crc" for each in self._layouts.checks),
             extended=sorted(self._layouts.extended),
             floats=self._floats(),
             nearest=nearest_helpers(self._types, self._plan.messages),

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from qlinkgen.backends.c.crc import field_check
 from qlinkgen.backends.c.forms import Helper, decimal_helpers, row_helpers, wide_helpers
 from qlinkgen.backends.c.names import storage, unsigned, unsigned_type
 from qlinkgen.backends.c.text_forms import Verb, text_helpers
+from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.digits import Digits
 from qlinkgen.model.integer import BitOrder, Chunk, Integer
 from qlinkgen.model.types import Scalar
@@ -35,8 +37,16 @@ class Layouts:
     _texts: set[tuple[int, Verb]] = field(default_factory=set)
     #: Rows of bits that are read or written: the width of the C type of an item, and the order.
     _rows: set[tuple[str, int, BitOrder]] = field(default_factory=set)
+    #: Algorithms of check values in payloads.
+    checks: list[Checksum] = field(default_factory=list)
     #: Widths of the C types that need sign extension.
     extended: set[int] = field(default_factory=set)
+
+    def check(self, algorithm: Checksum) -> str:
+        """What the names of the functions of an algorithm of check values in payloads begin with."""
+        if algorithm not in self.checks:
+            self.checks.append(algorithm)
+        return f"{self.prefix}_{field_check(self.checks.index(algorithm) + 1)}"
 
     def put(self, integer: AnyInteger, place: str, index: str, value: str) -> str:
         """A statement that writes an unsigned value."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen.backends.c import filled
 from qlinkgen.backends.c.check_values import CheckWriter
 from qlinkgen.backends.c.checks import as_unsigned, from_unsigned, refused_before_sending
 from qlinkgen.backends.c.names import unsigned, unsigned_type
@@ -266,13 +267,9 @@ def _names(envelope: Envelope) -> set[str]:
 
 def derived(part: EqualPart, other: str) -> str:
     """The value of a derived number."""
-    kind, mask = unsigned_type(part.integer.bits), part.integer.mask
-    every = unsigned(mask, part.integer.bits, hexadecimal=True)
-    value = f"({kind})({every} - {other})" if part.inverted else other
-    if not part.added:
-        return value
-    added = f"{value} + {unsigned(part.added & mask, part.integer.bits)}"
-    return f"({kind})(({added}) & {every})"
+    return filled.derived(
+        part.integer.bits, part.integer.mask, other, inverted=part.inverted, added=part.added
+    )
 
 
 def _signed(number: int) -> str:

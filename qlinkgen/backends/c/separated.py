@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.backends.c import checks
-from qlinkgen.backends.c.decode import Decoder
+from qlinkgen.backends.c.decode import Decoder, other_than
 from qlinkgen.backends.c.encode import Encoder, loop
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import count_type, unsigned
@@ -206,8 +206,7 @@ class SeparatedDecoder(Decoder):
             case ReservedStep():
                 pass
             case ConstantStep():
-                pattern = unsigned(step.value & step.integer.mask, step.integer.bits, hexadecimal=True)
-                self.refuse([f"{self._number(step.integer)} != {pattern}"], "RANGE")
+                self.refuse([other_than(step, self._number(step.integer))], "RANGE")
             case ValueStep():
                 self._assign(target, step.number, self._number(step.integer))
             case BytesStep():

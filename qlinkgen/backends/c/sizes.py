@@ -17,13 +17,16 @@ from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan, Place
 from qlinkgen.plan.planning import payload_plan
 from qlinkgen.plan.tree import MessagePlan
 
+#: Prints the number of items of a run as a size_t.
+Count = Callable[[str], str]
+
 
 def sized_by_message(message: MessagePlan) -> bool:
     """Whether a receiver derives the size of its payload from its counts."""
     return any(isinstance(each.end, ByMessage) for each in message.frames)
 
 
-def size_text(size: Size, count: Callable[[str], str]) -> str:
+def size_text(size: Size, count: Count) -> str:
     """A size as an expression; ``count`` prints the number of items of a run as a size_t."""
     terms = [f"{size.fixed}U"] if size.fixed or not size.terms else []
     return " + ".join([*terms, *(term_text(term, count(term.run)) for term in size.terms)])
@@ -62,7 +65,7 @@ def local_size(run: str) -> str:
     return f"(size_t){run}_count"
 
 
-def index_of(place: Place, count: Callable[[str], str], further: str = "") -> str:
+def index_of(place: Place, count: Count, further: str = "") -> str:
     """The offset of a step as an index, from the beginning or, if that varies, from the end."""
     if place.front.terms and place.back is not None:
         at = f"size - {place.back}U"

@@ -36,6 +36,8 @@ _SUPPORT = {
     "_frames": "CRC Address AddressBits Blocks Cell Check Constant ConstantBits DelimitedFrame Equal "
     "Fletcher Id IdBits Length Mark MarkedFrame Packet Payload Stuffing Sum Xor messages_of",
     "_ended": "Add Cobs Digits EndedFrame Escape Pair",
+    "_ffilled": "EqualTo Filled FilledMessage FilledRecord FilledTrimmed FilledVaried FilledVariedRecord "
+    "FilledWalked",
     "_fasked": "Asked Told",
     "_frecords": "Record",
     "_ftexts": "BetweenField Separated TextNumber",
@@ -57,6 +59,8 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
     text = "".join([_head(protocol), _imports(everything), *map(printed, everything)])
     folder = importlib.resources.files(__name__)
     names = {name for each in everything for name in used(each.node)}
+    if names & {*_SUPPORT["_ffilled"].split()}:
+        names |= {"Record", "Trimmed", "Varied"}
     # Records that are read one by one are walked.
     names |= {"Walked"} if names & {*_SUPPORT["_fvaried"].split()} else set()
     copied_modules = [each for each in _SUPPORT if each not in _OPTIONAL or names & {*_SUPPORT[each].split()}]

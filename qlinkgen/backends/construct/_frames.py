@@ -591,14 +591,7 @@ class Frame(Construct):
         for check in self.checks:
             if _seeds(check):
                 self._compare(check, {**cells, **seeds}, request)
-        try:
-            fields = message.parse(payload)
-        except RangeError as error:
-            raise FrameError(
-                "length", f"invalid payload of {len(payload)} bytes; {error}"
-            ) from None
-        except ConstructError as error:
-            raise FrameError("range", f"{message.name}; {error}") from None
+        fields = _parsed(message, payload)
         if not _allowed(message, address):
             raise FrameError(
                 "range", f"{message.name} cannot have {self.address} {address}"
@@ -618,6 +611,19 @@ class Frame(Construct):
                 values = b"".join(blocks.values(payload))
                 if cells[blocks.name] != values:
                     raise FrameError("crc", f"{blocks.name} are not {values.hex()}")
+
+
+def _parsed(message: Message, payload: bytes) -> Container:
+    """The fields of a payload."""
+    try:
+        return message.parse(payload)
+    except RangeError as error:
+        text = f"invalid payload of {len(payload)} bytes; {error}"
+        raise FrameError("length", text) from None
+    except FrameError:
+        raise
+    except ConstructError as error:
+        raise FrameError("range", f"{message.name}; {error}") from None
 
 
 def _seeds(check: Check) -> list[str]:

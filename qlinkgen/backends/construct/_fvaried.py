@@ -119,7 +119,7 @@ class Varied(Walked):
     ) -> tuple[Container, int, Mapping[str, int]]:
         """The values at an offset, that of their end, and the raw numbers that tests need."""
         counts, numbers, sizes = dict(self.known), dict[str, int](), dict[str, int]()
-        values = Container()
+        values, cells = Container(), dict[str, bytes]()
         for segment in self._segments():
             name, left = segment[0].name, end - at
             if not self._present(segment[0], numbers, left):
@@ -144,6 +144,8 @@ class Varied(Walked):
                         values.update(found)
                     elif isinstance(field.subcon, Default):
                         values[field.name] = found
+                    self._follow(field, cell, cells, path)
+                    cells[field.name] = cell
                     self._note(field, cell, numbers)
                     self._tell(field, cell, counts, sizes, path)
                     at += size

@@ -178,7 +178,7 @@ class Walked(Message):
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
         data, at = stream_read_entire(stream, path), 0
         counts, numbers = dict(self.known), dict[str, int]()
-        values = Container()
+        values, cells = Container(), dict[str, bytes]()
         for segment in self._segments():
             left = len(data) - at
             if not self._present(segment[0], numbers, left):
@@ -199,12 +199,23 @@ class Walked(Message):
                     values.update(found)
                 elif isinstance(field.subcon, Default):
                     values[field.name] = found
+                self._follow(field, cell, cells, path)
+                cells[field.name] = cell
                 self._note(field, cell, numbers)
                 self._learn(field, cell, counts, path)
                 at += len(cell)
         if at != len(data):
             raise RangeError(f"{len(data) - at} bytes follow {self.name}", path=path)
         return Container(self._by_value(values)) if self.slots else values
+
+    def _follow(
+        self, field: Renamed, cell: bytes, cells: Mapping[str, bytes], path: str
+    ) -> None:
+        """Verify a number that follows from the bytes of earlier fields."""
+
+    def _filled(self, field: Renamed, cell: bytes, cells: Mapping[str, bytes]) -> bytes:
+        """The bytes of a field, which may follow from those of earlier ones."""
+        return cell
 
     def _infer(
         self, field: Renamed, counts: dict[str, int], data: bytes, path: str
@@ -240,6 +251,7 @@ class Walked(Message):
         numbers: dict[str, int] = {}
         left_out = False
         sent: set[str] = set()
+        cells: dict[str, bytes] = {}
         for field in self.fields:
             if field.name in self.slots:
                 sent |= self._case(field, values, numbers, stream, path)
@@ -255,7 +267,8 @@ class Walked(Message):
                     path=path,
                 )
             if present:
-                cell = self._cell(field, values, path)
+                cell = self._filled(field, self._cell(field, values, path), cells)
+                cells[field.name] = cell
                 self._note(field, cell, numbers)
                 stream_write(stream, cell, len(cell), path)
         for slot in self.slots.values():

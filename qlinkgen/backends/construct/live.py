@@ -52,6 +52,7 @@ def live(protocol: Protocol, options: Options | None = None) -> Live:
         "_ftexts",
         "_ftrimmed",
         "_fvaried",
+        "_ffilled",
         "_fwalks",
         "_packed",
         "_ended",

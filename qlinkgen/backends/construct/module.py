@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import assert_never
 
+from qlinkgen.backends.construct.algorithms import algorithm
 from qlinkgen.backends.construct.payload import (
     Names,
     Types,
@@ -12,6 +13,7 @@ from qlinkgen.backends.construct.payload import (
     comment,
     fields,
     integer,
+    is_filled,
     presence_of,
     record,
 )
@@ -130,9 +132,12 @@ def _walking(payload: PayloadPlan) -> dict[str, Node]:
 def _class_of(payload: PayloadPlan) -> str:
     if payload.separator:
         return "Separated"
+    prefix = "Filled" if is_filled(payload) else ""
     if any(segment.records for segment in payload.segments):
-        return "Varied"
-    return "Walked" if payload.walked else "Message" if payload.trim is None else "Trimmed"
+        return f"{prefix}Varied"
+    if payload.walked:
+        return f"{prefix}Walked"
+    return f"{prefix}Message" if payload.trim is None else f"{prefix}Trimmed"
 
 
 def _absent(payload: PayloadPlan) -> Iterator[Presence]:
@@ -153,8 +158,8 @@ def _choices(payload: PayloadPlan) -> Iterator[Node]:
 
 def _frames(plan: Plan, messages: Mapping[str, str], types: Types) -> Iterator[Definition]:
     algorithms = _algorithms(plan)
-    for algorithm, name in algorithms.items():
-        yield Definition(name, _algorithm(algorithm), algorithm.name)
+    for each, name in algorithms.items():
+        yield Definition(name, algorithm(each), each.name)
     yield from _layouts(plan, types, algorithms)
     frames = []
     for direction in plan.protocol.directions:
@@ -224,39 +229,6 @@ def _algorithms(plan: Plan) -> Algorithms:
     return {
         each: "ALGORITHM" if number == 1 else f"ALGORITHM_{number}" for number, each in enumerate(found, 1)
     }
-
-
-def _algorithm(algorithm: catalogue.Checksum) -> Call:
-    init = (("init", algorithm.init),) if algorithm.init else ()
-    match algorithm:
-        case catalogue.Sum():
-            form = () if algorithm.form == "plain" else (algorithm.form,)
-            carry = (("carry", True),) if algorithm.carry else ()
-            return Call("Sum", (algorithm.width, *form), (*init, *carry))
-        case catalogue.Xor():
-            return Call("Xor", (), init)
-        case catalogue.Fletcher():
-            return Call("Fletcher", (algorithm.half, algorithm.modulus), init)
-        case catalogue.Algorithm():
-            return _crc(algorithm)
-        case _:
-            assert_never(algorithm)
-
-
-def _crc(algorithm: catalogue.Algorithm) -> Call:
-    digits = (algorithm.width + 3) // 4
-    return Call(
-        "CRC",
-        (),
-        (
-            ("width", algorithm.width),
-            ("poly", hexadecimal(algorithm.poly, digits)),
-            ("init", hexadecimal(algorithm.init, digits)),
-            ("refin", algorithm.refin),
-            ("refout", algorithm.refout),
-            ("xorout", hexadecimal(algorithm.xorout, digits)),
-        ),
-    )
 
 
 def _layout(envelope: Envelope, types: Types, algorithms: Algorithms) -> Sequence:

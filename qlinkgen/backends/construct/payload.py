@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from decimal import Decimal
 from typing import assert_never
 
+from qlinkgen.backends.construct.algorithms import algorithm
 from qlinkgen.backends.construct.tree import Call, Definition, Named, Node, Number, Ref, Sequence, hexadecimal
 from qlinkgen.model import naming
 from qlinkgen.model.fields import Layout
@@ -24,6 +25,8 @@ from qlinkgen.plan.payload import (
     BytesStep,
     ConstantStep,
     CountStep,
+    Equal,
+    FilledStep,
     ItemsStep,
     Member,
     PayloadPlan,
@@ -159,7 +162,7 @@ class Types:
                     yield step.number, _item(step)
                 case BitsStep():
                     yield from ((each.number, _bits(each)) for each in step.members)
-                case ConstantStep() | ReservedStep() | CountStep() | BytesStep():
+                case ConstantStep() | ReservedStep() | CountStep() | FilledStep() | BytesStep():
                     pass
                 case RecordStep() | RecordsStep():
                     pass
@@ -209,11 +212,12 @@ def record(layout: Layout, types: Types) -> Call:
     """The structure of a record."""
     payload = record_plan(layout).payload
     inside: tuple[Node, ...] = (layout.name, *(_Field(layout, types).of(step) for step in payload.steps))
+    prefix = "Filled" if is_filled(payload) else ""
     if not payload.walked and layout.name not in types.ended:
-        return Call("Record", inside)
+        return Call(f"{prefix}Record", inside)
     presence = tuple(presence_of(payload))
     settings: dict[str, Node] = {"presence": Sequence(presence)} if presence else {}
-    return Call("VariedRecord", inside, (*settings.items(), ("most", payload.most)))
+    return Call(f"{prefix}VariedRecord", inside, (*settings.items(), ("most", payload.most)))
 
 
 def presence_of(payload: PayloadPlan) -> Iterator[Node]:
@@ -245,7 +249,9 @@ class _Field:
                     step, self._value(step.number, _raw(step.number, step.integer)), step.number.unit
                 )
             case ConstantStep():
-                return self._named(step, Call("Const", (step.value, integer(step.integer))))
+                return self._named(step, _constant(step))
+            case FilledStep():
+                return self._named(step, _filled(step))
             case ReservedStep():
                 return self._named(step, _reserved(step))
             case CountStep():
@@ -305,6 +311,30 @@ class _Field:
 
     def _value(self, number: Scalar, raw: Node) -> Node:
         return self._types.value(number, raw)
+
+
+def _constant(step: ConstantStep) -> Call:
+    if not step.accepted:
+        return Call("Const", (step.value, integer(step.integer)))
+    known = Call("OneOf", (integer(step.integer), Sequence((step.value, *step.accepted))))
+    return Call("Rebuild", (known, step.value))
+
+
+def _filled(step: FilledStep) -> Call:
+    rule = step.rule
+    if isinstance(rule, Equal):
+        settings: dict[str, Node] = {"inverted": True} if rule.inverted else {}
+        settings |= {"added": rule.added} if rule.added else {}
+        given: Node = Call("EqualTo", (integer(rule.source),), tuple(settings.items()))
+    else:
+        given = algorithm(rule)
+    over = Sequence(step.over)
+    return Call("Filled", (integer(step.integer), step.integer.bits, over, given))
+
+
+def is_filled(payload: PayloadPlan) -> bool:
+    """Whether a number follows from other bytes."""
+    return any(isinstance(step, FilledStep) for step in payload.steps)
 
 
 def _reserved(step: ReservedStep) -> Call:

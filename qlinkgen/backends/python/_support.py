@@ -247,16 +247,15 @@ class MaskRule(Rule):
 
 
 class ConstantRule(Rule):
-    """A constant number; other received numbers are illegal."""
+    """A constant number; other received numbers are illegal, except the ``others``."""
 
     __slots__ = ()
 
     settable = False
 
-    def __init__(self, name: str, value: int) -> None:
-        super().__init__(
-            name, f"the constant {value:#x}" if value >= 0 else f"the constant {value}"
-        )
+    def __init__(self, name: str, value: int, *others: int) -> None:
+        words = [f"{each:#x}" if each >= 0 else str(each) for each in (value, *others)]
+        super().__init__(name, f"the constant {' or '.join(words)}")
 
 
 class CountRule(Rule):

@@ -31,6 +31,7 @@ from qlinkgen.plan.payload import (
     BytesStep,
     ConstantStep,
     CountStep,
+    FilledStep,
     Holder,
     ItemsStep,
     Member,
@@ -365,7 +366,7 @@ def _kind(step: Step) -> str:
             return pascal(step.record.name)
         case RecordsStep():
             return f"{pascal(step.record.name)}s"
-        case ValueStep() | ConstantStep() | ReservedStep() | CountStep() | BitsStep():
+        case ValueStep() | ConstantStep() | ReservedStep() | CountStep() | FilledStep() | BitsStep():
             return f"{'I' if step.integer.signed else 'U'}{step.integer.bits}"
         case _:
             assert_never(step)

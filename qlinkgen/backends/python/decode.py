@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import assert_never
 
-from qlinkgen.backends.python import floats, integers, pieces, values
+from qlinkgen.backends.python import filled, floats, integers, pieces, values
 from qlinkgen.backends.python.layout import WIDTH, indented, literal, slice_of, wrapped
 from qlinkgen.backends.python.names import held
 from qlinkgen.backends.python.place import Place
@@ -35,6 +35,7 @@ from qlinkgen.plan.payload import (
     Compare,
     ConstantStep,
     CountStep,
+    FilledStep,
     Infer,
     ItemsStep,
     Learn,
@@ -399,7 +400,7 @@ class Decoder:
 
     # Steps
 
-    def _step(self, step: Step) -> None:
+    def _step(self, step: Step) -> None:  # noqa: C901  # a case a step
         at = step.place.front
         match step:
             case ValueStep():
@@ -407,12 +408,14 @@ class Decoder:
             case ConstantStep():
                 number = self._get(step.integer, f"{step.name}_raw", at)
                 self._put_together(step.integer, number, value_name(step), self._offset(step))
-                rule = Within(step.value, step.value)
-                self._refuse(integers.broken(rule, number), value_name(step), number, self._offset(step))
+                for rule in step.conditions:
+                    self._refuse(integers.broken(rule, number), value_name(step), number, self._offset(step))
             case ReservedStep():
                 self._row(at).codes.append(f"{step.integer.size}x")
             case CountStep():
                 self._count_step(step, at)
+            case FilledStep():
+                self._filled(step, at)
             case BitsStep():
                 self._bits(step, at)
             case BytesStep():
@@ -485,6 +488,25 @@ class Decoder:
             self._refuse_stray(taken, step.name, offset)
         else:
             self._row(at).codes.append(f"{step.integer.size}x")
+
+    def _filled(self, step: FilledStep, at: Size) -> None:
+        raw = self._get(step.integer, f"{step.name}_raw", at)
+        self._put_together(step.integer, raw, step.name, self._offset(step))
+        begin, end = (self._at(each) if each.terms else self._from(each) for each in (step.begin, step.end))
+        right = f"{step.name}_right"
+        self._values += filled.number(step, self.place.data, begin, end, self.place)
+        self._values += [f"{right} = {filled.right(step, self.place)}", f"if {raw} != {right}:"]
+        seen = [
+            "cls",
+            f'"{step.fault}"',
+            f'"{step.name}"',
+            raw,
+            right,
+            f"offset={self._offset(step)}",
+            f"payload={self.place.payload}",
+        ]
+        call = wrapped(f"raise {self.place.use('differing')}(", seen, ")", _INDENT + 4)
+        self._values += indented(call)
 
     def _bits(self, step: BitsStep, at: Size) -> None:
         whole = f"{step.name}_whole"

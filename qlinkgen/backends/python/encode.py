@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from qlinkgen.backends.python import floats, integers, pieces
+from qlinkgen.backends.python.filled import Filling, filling
 from qlinkgen.backends.python.layout import (
     bare,
     in_hex,
@@ -42,6 +43,7 @@ from qlinkgen.plan.payload import (
     BytesStep,
     ConstantStep,
     CountStep,
+    FilledStep,
     ItemsStep,
     Member,
     RecordsStep,
@@ -89,11 +91,14 @@ class Encoder:
     _lines: list[str] = field(default_factory=list)
     _terms: list[str] = field(default_factory=list)
     _late: list[str] = field(default_factory=list)
-    _pieces: list[Row | str] = field(default_factory=list)
+    _pieces: list[Row | Filling | str] = field(default_factory=list)
+    #: The local with the bytes so far.
+    _local: str = "data"
 
     def statements(self, name: str) -> list[str]:
         """Statements that assign the bytes to the local ``name``, or return them if it is empty."""
         self._tabled = tabled(self.message.payload, self.place.byteorder)
+        self._local = name or "data"
         self._measure()
         for part in self.place.front:
             self._part(part)
@@ -205,9 +210,9 @@ class Encoder:
             case CellPart():
                 return " | ".join(map(self._slot, part.slots))
             case EqualPart(of=CellPart()):
-                return pieces.derived(part, f"{part.of.name}_part")
+                return pieces.derived_part(part, f"{part.of.name}_part")
             case EqualPart():
-                return pieces.derived(part, self._part_number(part.of))
+                return pieces.derived_part(part, self._part_number(part.of))
             case _:
                 assert_never(part)
 
@@ -230,7 +235,7 @@ class Encoder:
     # Steps
 
     def _add(self, code: str, *arguments: str) -> None:
-        if not self._pieces or isinstance(self._pieces[-1], str):
+        if not self._pieces or not isinstance(self._pieces[-1], Row):
             self._pieces.append(Row())
         row = self._pieces[-1]
         assert isinstance(row, Row)
@@ -247,7 +252,7 @@ class Encoder:
         if integer.text and integer.text.point:
             self.place.use("decimal")
 
-    def _step(self, step: Step) -> None:
+    def _step(self, step: Step) -> None:  # noqa: C901  # a case a step
         match step:
             case ValueStep():
                 self._value(step)
@@ -255,6 +260,8 @@ class Encoder:
                 self._number(step.integer, step.value)
             case CountStep():
                 self._computed(step.name, step.integer, integers.count_text(step))
+            case FilledStep():
+                self._pieces.append(filling(step, self._local, self.place))
             case BitsStep():
                 self._bits(step)
             case BytesStep():
@@ -462,14 +469,21 @@ class Encoder:
             return [f'{name} = b""' if name else 'return b""']
         if len(self._pieces) == 1:
             return self._piece(self._pieces[0], rows, f"{name} = " if name else "return ")
-        local = name or "data"
-        lines = self._piece(self._pieces[0], rows, f"{local} = ")
+        lines = self._piece(self._pieces[0], rows, f"{self._local} = ")
         for piece in self._pieces[1:]:
-            lines += self._piece(piece, rows, f"{local} += ")
-        return lines if name else [*lines, f"return {local}"]
+            lines += self._piece(piece, rows, f"{self._local} += ")
+        return lines if name else [*lines, f"return {self._local}"]
 
-    def _piece(self, piece: Row | str, rows: list[Row], before: str) -> list[str]:
-        return [before + piece] if isinstance(piece, str) else self._call(piece, rows, before)
+    def _piece(self, piece: Row | Filling | str, rows: list[Row], before: str) -> list[str]:
+        match piece:
+            case Row():
+                return self._call(piece, rows, before)
+            case Filling():
+                return [*piece.lines, before + piece.octets]
+            case str():
+                return [before + piece]
+            case _:
+                assert_never(piece)
 
     def _call(self, row: Row, rows: list[Row], before: str) -> list[str]:
         # The number precedes the title, because the name of a message may end in a number.

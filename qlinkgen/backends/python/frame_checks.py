@@ -17,12 +17,12 @@ def check_view(check: Check, mark: str = "") -> CheckView:
     """The view of a check value."""
     algorithm = check.algorithm
     selectable = isinstance(algorithm, Algorithm) and algorithm.width == 16
-    maker, arguments = _algorithm(algorithm)
+    maker, arguments = maker_of(algorithm)
     definition = wrapped(f"_CHECKSUM{mark} = {maker}(", arguments, ")", 0)
     return CheckView(definition, check.size, check.regular or "", check_bytes(check), selectable, maker)
 
 
-def _algorithm(algorithm: Checksum) -> tuple[str, list[str]]:
+def maker_of(algorithm: Checksum) -> tuple[str, list[str]]:
     """The function of the support module that makes an algorithm, and its arguments."""
     name = f'"{algorithm.name}"'
     init = [] if not algorithm.init else [f"init={algorithm.init}"]

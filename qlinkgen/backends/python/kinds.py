@@ -227,7 +227,7 @@ def _number(part: LengthPart | CellPart | EqualPart) -> str:
             terms = [_bits(slot) for slot in part.slots]
             return terms[0].removeprefix("(").removesuffix(")") if len(terms) == 1 else " | ".join(terms)
         case EqualPart():
-            return pieces.derived(part, _local(part.of))
+            return pieces.derived_part(part, _local(part.of))
         case _:
             assert_never(part)
 

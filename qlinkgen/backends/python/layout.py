@@ -58,7 +58,9 @@ def listing(head: str, items: Iterable[str], tail: str, indent: int) -> list[str
 def slice_of(data: str, start: str, end: str) -> str:
     """``data[start:end]``, with blanks around the colon if an index is an expression."""
     simple = all(each.lstrip("-").isdecimal() or each.isidentifier() for each in (start, end) if each)
-    return f"{data}[{start}:{end}]" if simple else f"{data}[{start} : {end}]"
+    if simple:
+        return f"{data}[{start}:{end}]"
+    return f"{data}[{start} : {end}]" if end else f"{data}[{start} :]"
 
 
 def in_hex(number: int, size: int = 1) -> str:

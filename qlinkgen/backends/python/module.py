@@ -12,6 +12,7 @@ from qlinkgen.backends.base import banner
 from qlinkgen.backends.python import frames, tables
 from qlinkgen.backends.python.classes import ClassBuilder, ClassModel
 from qlinkgen.backends.python.fitted import fitted
+from qlinkgen.backends.python.frame_checks import maker_of
 from qlinkgen.backends.python.frame_directions import (
     DecodedDirection,
     UnknownView,
@@ -20,7 +21,7 @@ from qlinkgen.backends.python.frame_directions import (
 )
 from qlinkgen.backends.python.frame_views import MarkedView, PacketView, PartsView, UniqueView
 from qlinkgen.backends.python.kinds import AnyView, KindsView, kinds_view
-from qlinkgen.backends.python.layout import WIDTH
+from qlinkgen.backends.python.layout import WIDTH, wrapped
 from qlinkgen.backends.python.names import by_kind, class_name, imported
 from qlinkgen.backends.python.place import Place, place_of
 from qlinkgen.backends.python.sections import Sections, templates
@@ -51,6 +52,7 @@ _SHARED: Mapping[str, Sequence[str]] = {
         "xor_of",
     ),
     "_digits": ("BetweenRule", "decimal", "read_decimal", "read_hexadecimal", "start_of"),
+    "_filled": ("differing",),
     "_rchoices": ("ChoiceRule",),
     "_records": (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records"),
     "_rules": ("FloatRule", "ListRule", "PaddedRule"),
@@ -150,7 +152,7 @@ class Module:
             bus=tables.bus(plan.protocol.bus),
             commands=tables.command_rows(plan),
             records=[MessageRow(each.name, self.place.classes[each.name]) for each in plan.layouts],
-            scales=self.builder.scales,
+            scales=[*self.builder.scales, *self._field_checks()],
             classes=self._classes(models, view, sections.ways),
             public=self._public(view, decoded),
             imports=self._imports(list(views.values()), models),
@@ -164,6 +166,14 @@ class Module:
         template = view.decoder if isinstance(view, PartsView) else view.template
         decoder = _placed(f"{template}_decoder.j2", module, search=sections.search, refusing=refusing).strip()
         return _tidy(_placed("module.j2", module, frame=sections.frame, decoder=decoder))
+
+    def _field_checks(self) -> list[str]:
+        """Definitions of the algorithms of check values in payloads; complete once the classes are built."""
+        lines: list[str] = []
+        for algorithm in self.place.checks:
+            maker, arguments = maker_of(algorithm)
+            lines += wrapped(f"{self.place.check(algorithm)} = {self.place.use(maker)}(", arguments, ")", 0)
+        return lines
 
     def _doc(self) -> list[str]:
         protocol = self.plan.protocol

@@ -45,16 +45,21 @@ def wrong(envelope: Envelope, part: Part, source: str) -> Iterator[str]:
                 right = ", ".join(f"0x{value:02X}" for value in slot.values)
                 yield f"{seen} not in ({right})" if len(slot.values) > 1 else f"{seen} != {right}"
         case EqualPart():
-            yield f"{read(envelope, part, source)} != {derived(part, read(envelope, part.of, source))}"
+            yield f"{read(envelope, part, source)} != {derived_part(part, read(envelope, part.of, source))}"
         case _:
             pass
 
 
-def derived(part: EqualPart, other: str) -> str:
-    """The value of a derived number."""
-    if not part.inverted and not part.added:
+def derived_part(part: EqualPart, other: str) -> str:
+    """The value of a derived part."""
+    return derived(other, inverted=part.inverted, added=part.added, mask=part.integer.mask)
+
+
+def derived(other: str, *, inverted: bool, added: int, mask: int) -> str:
+    """The value of a number derived from another one."""
+    if not inverted and not added:
         return other
     primary = other if other.isidentifier() or other.endswith("]") or other.isdecimal() else f"({other})"
-    value = f"~{primary}" if part.inverted else primary
-    value += f" {'+' if part.added > 0 else '-'} {abs(part.added)}" if part.added else ""
-    return f"({value if part.inverted and not part.added else f'({value})'} & 0x{part.integer.mask:X})"
+    value = f"~{primary}" if inverted else primary
+    value += f" {'+' if added > 0 else '-'} {abs(added)}" if added else ""
+    return f"({value if inverted and not added else f'({value})'} & 0x{mask:X})"

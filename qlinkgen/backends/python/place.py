@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import assert_never
 
 from qlinkgen.backends.python.names import named_classes
+from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.naming import address_attribute
 from qlinkgen.plan.ends import Gaps, Hunt, InStep, Marks, Rescan
@@ -28,6 +29,7 @@ class Place:
         unique: the last step of an encoder adds the preamble, and the receiver checks it.
         texts: print text defaults as text, not as numbers.
         used: names of imports used so far.
+        checks: algorithms of the check values in payloads so far.
     """
 
     byteorder: ByteOrder
@@ -37,11 +39,18 @@ class Place:
     unique: bool
     texts: bool = True
     used: set[str] = field(default_factory=set, compare=False)
+    checks: list[Checksum] = field(default_factory=list, compare=False)
 
     def use(self, name: str) -> str:
         """Add a name to the imports of the module and return it."""
         self.used.add(name)
         return name
+
+    def check(self, algorithm: Checksum) -> str:
+        """The constant of an algorithm of check values in payloads."""
+        if algorithm not in self.checks:
+            self.checks.append(algorithm)
+        return f"_CHECK_{self.checks.index(algorithm) + 1}"
 
     @property
     def bare(self) -> Place:

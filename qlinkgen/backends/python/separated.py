@@ -116,7 +116,8 @@ class SeparatedDecoder(WalkedDecoder):
                 return lines
             case ConstantStep():
                 raw = self._read(step.integer, step.name, offset)
-                self._refuse(integers.broken(Within(step.value, step.value), raw), step.name, raw, offset)
+                for rule in step.conditions:
+                    self._refuse(integers.broken(rule, raw), step.name, raw, offset)
             case ValueStep():
                 raw = self._read(step.integer, step.name, offset)
                 for rule in step.conditions:

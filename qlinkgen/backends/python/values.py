@@ -21,6 +21,7 @@ from qlinkgen.plan.payload import (
     BytesStep,
     ConstantStep,
     CountStep,
+    FilledStep,
     Holder,
     ItemsStep,
     Member,
@@ -225,10 +226,10 @@ def _plain_rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Ca
     name = held(step)
     match step:
         case ConstantStep():
-            return [_rule(place, "ConstantRule", name, step.value)]
+            return [_rule(place, "ConstantRule", name, step.value, *step.accepted)]
         case CountStep():
             return [_rule(place, "CountRule", name, f'"{step.run}"')]
-        case ReservedStep():
+        case ReservedStep() | FilledStep():
             return []
         case BitsStep():
             return [rule for member in step.members for rule in _member_rules(member, place, scales)]

@@ -16,6 +16,7 @@ from qlinkgen.plan.payload import (
     BytesStep,
     ConstantStep,
     CountStep,
+    FilledStep,
     Holder,
     ItemsStep,
     Member,
@@ -128,7 +129,7 @@ class Rule:
                 count = self._count(step.length)
                 records = [self.values(step.record.payload) for _ in range(count)]
                 return {step.name: _ended(step, records) if step.last else records}
-            case ConstantStep() | ReservedStep() | CountStep():
+            case ConstantStep() | ReservedStep() | CountStep() | FilledStep():
                 return {}
             case _:
                 assert_never(step)

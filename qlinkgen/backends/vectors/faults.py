@@ -43,6 +43,7 @@ from qlinkgen.plan.payload import (
     BytesStep,
     ConstantStep,
     CountStep,
+    FilledStep,
     ItemsStep,
     Member,
     RecordPlan,
@@ -371,13 +372,16 @@ def _spoilt(step: Step, data: bytes) -> Iterator[tuple[str, int, bytes]]:
     return _spoilt_simple(step, data)
 
 
-def _spoilt_simple(step: SimpleStep, data: bytes) -> Iterator[tuple[str, int, bytes]]:
+def _spoilt_simple(step: SimpleStep, data: bytes) -> Iterator[tuple[str, int, bytes]]:  # noqa: C901  # a case a step
     match step:
         case ValueStep() | ConstantStep():
             yield from _beside(step.name, step.integer, step.conditions)
         case CountStep():
             number = step.integer.unpack(data[: step.integer.size])
             yield from _beside(step.name, step.integer, (Within(number, number),))
+        case FilledStep():
+            number = step.integer.unpack(data[: step.integer.size]) ^ 1
+            yield step.name, number, step.integer.pack(number)
         case BitsStep():
             whole = step.integer.unpack(data[: step.integer.size])
             for member in step.members:

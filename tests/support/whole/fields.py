@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Protocol
 
+from tests.support.whole.filled import add_filled
 from tests.support.whole.frames import Shape
 
 Doc = dict[str, Any]
@@ -70,6 +71,8 @@ class FieldMaker:
     conditional: float = 0.25
     #: Fraction of messages with a choice.
     choosing: float = 0.15
+    #: Fraction of messages and records with numbers that follow from other fields.
+    filled: float = 0.2
 
     def types(self) -> Doc:
         """Enums, flags and named types."""
@@ -127,6 +130,11 @@ class FieldMaker:
             size += more
             has_value = has_value or not (isinstance(spec, dict) and {"const", "reserved"} & spec.keys())
         if has_value:
+            if not self.shape.groups and self.shape.word <= 1 and self.rng.random() < self.filled:
+                listed = list(made.items())
+                before = len(listed)
+                add_filled(self.rng, listed, lambda: self.words.name(taken), room=4)
+                made, size = dict(listed), size + 4 * (len(listed) > before)
             name = self.words.name(self.taken)
             about = {"doc": self.words.text()} if self.rng.random() < 0.5 else {}
             self.records[name] = Structure({**about, "fields": made}, size, depth)
@@ -164,6 +172,10 @@ class FieldMaker:
             else:
                 made[name], step = self._plain()
                 size += step
+        if not self.shape.groups and rng.random() < self.filled:
+            kinds = {"type": "u8", "algorithm": rng.choice(("xor8", "sum8", "crc-8/smbus")), "over": [first]}
+            made = {first: made.pop(first), self.words.name(taken): kinds, **made}
+            size += 1
         varies = any(
             isinstance(each, dict) and {"if", "counts", "last"} & each.keys() for each in made.values()
         )
@@ -267,6 +279,9 @@ class FieldMaker:
         dated = self._dated(made, taken)
         if not fixed and not room.least and self.rng.random() < self.choosing:
             self._add_choice(dated, taken, room)
+        if self.shape.word <= 1 and not self.shape.groups and rng.random() < self.filled:
+            left = room.left - room.least
+            add_filled(rng, dated, lambda: self.words.name(taken), room=left, varied=self.varied)
         return dict(dated)
 
     def _add_choice(self, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
@@ -761,11 +776,9 @@ class FieldMaker:
     def _constant(self) -> tuple[Any, int]:
         kind, order, size = self._integer()
         low, high = _limits(kind)
-        return {
-            "type": kind,
-            **order,
-            "const": self.rng.choice((high, low, self.rng.randint(low, high))),
-        }, size
+        const = self.rng.choice((high, low, self.rng.randint(low, high)))
+        several = self.rng.random() < 0.2
+        return {"type": kind, **order, "const": [const, low, high] if several else const}, size
 
     def _reserved(self) -> tuple[Any, int]:
         kind, order, size = self._integer()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -218,7 +219,15 @@ class Fields:
             return Slot(name, Packed(number.pieces, number.bits, members))
         if "counts" in spec:
             return Slot(name, number, "count", str(spec["counts"]), spec.get("counts_in", "items"))
+        if "algorithm" in spec:
+            return Slot(name, number, "filled", rule=spec, over=tuple(spec["over"]))
+        if "equals" in spec:
+            source = re.sub(r"[-+] *\d+|[~ ]", "", spec["equals"])
+            return Slot(name, number, "filled", rule=spec, over=(source,))
         number = _quantified(number, spec)
+        if isinstance(spec.get("const"), list):
+            several = [self._with_default(number, base, {"const": each}, "const") for each in spec["const"]]
+            return Slot(name, several[0], "constant", accepted=tuple(each.default for each in several))
         if spec.get("reserved"):
             return Slot(name, self._with_default(number, base, spec, "const"), "reserved")
         key = "const" if "const" in spec else "default"

@@ -185,6 +185,11 @@ class Slot:
     role: Role = "value"
     counts: str = ""
     counts_in: str = "items"
+    #: Of a number that follows from other fields: how, and their names.
+    rule: Mapping[str, Any] | None = None
+    over: tuple[str, ...] = ()
+    #: Constants that are legal besides the one that is sent.
+    accepted: tuple[int, ...] = ()
     #: Bytes of other fields that it counts as well.
     more: int = 0
     #: Tests of earlier values: name, ranges, whether they are excluded.

@@ -14,7 +14,7 @@ Doc = dict[str, Any]
 Direction = Literal["request", "response", "message"]
 
 
-Role = Literal["value", "constant", "reserved", "count"]
+Role = Literal["value", "constant", "reserved", "count", "filled"]
 
 
 class Prefixed(int):

@@ -265,7 +265,7 @@ class Searcher(Receiver):
         unproven = not (self.frame.checks or self.frame.blocks) or (
             self.frame.seeded and event.kind == "unknown"
         )
-        if event.kind == "crc" or (event.kind != "message" and unproven):
+        if self._damaged(cut) or (event.kind != "message" and unproven):
             # It may not be a frame at all, so another one may begin after its first byte.
             raise Refused(event.kind, cut.size)
         return event, cut.size - cut.kept, cut.pending
@@ -283,12 +283,16 @@ class Searcher(Receiver):
             raise Refused("length", cut.size)
         return plain
 
+    def _damaged(self, cut: Cut) -> bool:
+        """Whether a check value of the frame is wrong."""
+        message = self.known.get(self.frame.number("message", cut.parts) or 0)
+        return self.frame.check_fails(cut.parts, self.frame.seeds.get(message.number, {}) if message else {})
+
     def _event(self, cut: Cut, payload: bytes) -> Event:
         raw = self.buffer[: cut.size]
         number, address = (self.frame.number(role, cut.parts) for role in ("message", "address"))
         message = self.known.get(number or 0)
-        seeds = self.frame.seeds.get(message.number, {}) if message else {}
-        if self.frame.check_fails(cut.parts, seeds):
+        if self._damaged(cut):
             return Event("crc", self.at, self.start, raw)
         beside = partial(self.frame.values, cut.parts)
         return self.carried(message, address, lambda: payload, self.start, raw, beside=beside)

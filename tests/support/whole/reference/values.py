@@ -7,6 +7,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import TypeAlias
 
+from tests.support.whole.reference import checks
 from tests.support.whole.reference.layouts import (
     Kind,
     Message,
@@ -125,8 +126,32 @@ def _between(message: Message, payload: bytes) -> dict[str, Raw]:
     return values
 
 
+def _follows(slot: Slot, slots: Sequence[Slot], cells: Mapping[str, bytes]) -> bytes:
+    """The bytes of a number that follows from the bytes of other fields."""
+    assert slot.rule is not None
+    assert isinstance(slot.kind, Number)
+    data = b"".join(cells[name] for name in slot.over)
+    if "algorithm" in slot.rule:
+        number = checks.compute(slot.rule["algorithm"], data, slot.rule.get("init"))
+    else:
+        text = slot.rule["equals"].replace(" ", "")
+        source = next(each.kind for each in slots if each.name == slot.over[0])
+        assert isinstance(source, Number | Packed)
+        number = get(source.pieces, data)
+        number = ~number if text[0] == "~" else number
+        number += int(text.removeprefix("~").removeprefix(slot.over[0]) or 0)
+    return put(slot.kind.pieces, number & (1 << slot.kind.bits) - 1)
+
+
+def _verify(slot: Slot, slots: Sequence[Slot], cells: Mapping[str, bytes]) -> None:
+    """Compare the bytes of a field with those that follow from others. Raises Wrong."""
+    if slot.rule is not None and cells[slot.name] != _follows(slot, slots, cells):
+        raise Wrong("crc" if "algorithm" in slot.rule else "range", slot.name)
+
+
 def _fields(slots: Sequence[Slot], values: Mapping[str, Raw]) -> bytes:
     data, left_out = b"", False
+    cells: dict[str, bytes] = {}
     for slot in slots:
         given = {values[name] is not None for name, _ in slot.values()}
         sent = holds(slot, {name: raw for name, raw in values.items() if isinstance(raw, int)})
@@ -135,7 +160,11 @@ def _fields(slots: Sequence[Slot], values: Mapping[str, Raw]) -> bytes:
             left_out = not sent
         if given - {sent}:
             raise Wrong("range", f"{slot.name} is absent, or is not")
-        data += _encoded(slots, slot, values) if sent else b""
+        if slot.rule is not None:
+            cells[slot.name] = _follows(slot, slots, cells)
+        else:
+            cells[slot.name] = _encoded(slots, slot, values) if sent else b""
+        data += cells[slot.name]
     return data
 
 
@@ -278,8 +307,11 @@ def decode(message: Message, payload: bytes) -> dict[str, Raw]:
     values: dict[str, Raw] = {}
     if message.trim is not None:
         payload += bytes(max(0, message.sizes[1] - len(payload)))
+    cells: dict[str, bytes] = {}
     for slot, data, number in _cut(message, payload):
+        cells[slot.name] = data
         values |= _decoded(slot, data, number)
+        _verify(slot, message.slots, cells)
     return values
 
 
@@ -313,6 +345,7 @@ class _Walk:
         self._counted: dict[str, int] = {}
         #: Bytes of records of variable size.
         self._sizes: dict[str, int] = {}
+        self._cells: dict[str, bytes] = {}
 
     def run(self, at: int, end: int) -> tuple[dict[str, Raw], int]:
         """The values, and the offset of the end."""
@@ -344,7 +377,9 @@ class _Walk:
             number = None
             if isinstance(kind, Run | Records) and not slot.fixed:
                 number = len(data) // kind.step
+            self._cells[slot.name] = data
             values |= _decoded(slot, data, number)
+            _verify(slot, self.slots, self._cells)
             note(slot, data, self.numbers)
             if slot.counts:
                 self._count(slot, data)
@@ -423,7 +458,7 @@ def _decoded(slot: Slot, data: bytes, number: int | None) -> dict[str, Raw]:
         return {slot.name: [_decoded_record(kind.record, data[at : at + kind.step]) for at in starts]}
     if isinstance(kind, Run):
         return {slot.name: _decoded_run(kind, data, kind.most if number is None else number)}
-    if slot.role == "reserved":
+    if slot.role in ("reserved", "filled"):
         return {}
     if not (isinstance(kind, Number) and kind.text) and stray(kind.pieces, data):
         raise Wrong("range", slot.name)
@@ -435,7 +470,7 @@ def _decoded(slot: Slot, data: bytes, number: int | None) -> dict[str, Raw]:
         return {}
     check(kind, raw)
     if slot.role == "constant":
-        if raw != kind.default:
+        if raw not in (kind.default, *slot.accepted):
             raise Wrong("range", slot.name)
         return {}
     return {slot.name: kind.told(raw)}
@@ -443,9 +478,12 @@ def _decoded(slot: Slot, data: bytes, number: int | None) -> dict[str, Raw]:
 
 def _decoded_record(kind: Record, data: bytes) -> dict[str, Raw]:
     values: dict[str, Raw] = {}
+    cells: dict[str, bytes] = {}
     at = 0
     for slot in kind.slots:
-        values |= _decoded(slot, data[at : at + slot.most_bytes], None)
+        cells[slot.name] = data[at : at + slot.most_bytes]
+        values |= _decoded(slot, cells[slot.name], None)
+        _verify(slot, kind.slots, cells)
         at += slot.most_bytes
     return values
 
