@@ -160,12 +160,15 @@ def _split(nodes: list[Node], indent: int) -> list[str]:
         long = len(_flat(nodes[start : places[0]])) + indent + 4 >= WIDTH and not several
         if long or indent + len(_flat(nodes[: places[0]])) < WIDTH:
             return _bracketed(nodes, indent, "", start)
+    united = any(_is(each, "|") for each in head)
+    if _is(body[0], "await") and not united and any(_has_content(each) for each in head[:-1]):
+        return _bracketed(nodes, indent, "", 0, start)  # an annotation is split before what is awaited
     margin = " " * indent
     rest = [Word(")", blank=False), *nodes[start - 1 :]]
     if any(_is(each, ",") for each in head):
         return [f"{margin}(", *_inside(head[:-1], indent + 4, joined=False), *_split(rest, indent)]
     opening = f"{margin}{_flat([*head, Word('(', blank=True)])}"
-    if any(_is(each, "|") for each in head) and (_is(body[0], "await") or len(opening) > WIDTH):
+    if united and (_is(body[0], "await") or len(opening) > WIDTH):
         first = f"{margin}{_flat(head[:2])} ("  # the alternatives of an annotation
         return [first, *_inside(head[2:-1], indent + 4), *_split(rest, indent)]
     if len(opening) > WIDTH:

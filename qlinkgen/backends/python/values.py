@@ -46,6 +46,8 @@ Slot = Sequence[Holder]
 def annotation(slot: Slot, place: Place) -> str:
     """Type of the attribute."""
     kinds = dict.fromkeys(part for each in slot for part in _annotation(each, place).split(" | "))
+    if "float" in kinds:
+        kinds.pop("int", None)  # type checkers take an int for a float
     return " | ".join((*kinds, "None") if slot[0].presence is not None else kinds)
 
 
