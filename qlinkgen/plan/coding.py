@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import assert_never
+from typing import Protocol, assert_never
 
 from qlinkgen.model import coding as stated
 
@@ -26,6 +26,16 @@ class Read:
     plain: bytes
     places: tuple[int, ...]
     wrong: int | None = None
+
+
+class Source(Protocol):
+    """Coded bytes that are decoded as they are read."""
+
+    def byte(self) -> int:
+        """The next coded byte."""
+
+    def miscoded(self, byte: int) -> int:
+        """The last coded byte is wrong; what it is taken as."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +75,14 @@ class Escaping:
                 found.append((self.plain[byte] if escaped else byte, at))
             escaped = not escaped and byte == self.escape
         return _read(found, len(sent) if escaped else None)
+
+    def take(self, source: Source) -> int:
+        """The next byte."""
+        byte = source.byte()
+        if byte != self.escape:
+            return byte
+        second = source.byte()
+        return self.plain[second] if second in self.plain else source.miscoded(second)
 
     def growth(self, size: int) -> int:
         """Maximum number of bytes added to ``size`` bytes."""
@@ -124,6 +142,16 @@ class Digits:
             found.append((int(sent[at : at + 2], 16), at + 1))
         return _read(found, None)
 
+    def take(self, source: Source) -> int:
+        """The next byte."""
+        digits = b""
+        for _ in range(2):
+            digit = source.byte()
+            if bytes((digit,)) not in _DIGITS:
+                return source.miscoded(digit)
+            digits += bytes((digit,))
+        return int(digits, 16)
+
     def growth(self, size: int) -> int:
         """Maximum number of bytes added to ``size`` bytes."""
         return size
@@ -149,6 +177,11 @@ class Pair:
             found.append((sent[at], at + 1))
         return _read(found, None)
 
+    def take(self, source: Source) -> int:
+        """The next byte."""
+        byte, second = source.byte(), source.byte()
+        return byte if second == byte ^ 0xFF else source.miscoded(second)
+
     def growth(self, size: int) -> int:
         """Maximum number of bytes added to ``size`` bytes."""
         return size
@@ -167,6 +200,10 @@ class Add:
     def read(self, sent: bytes) -> Read:
         """Decode; every byte is right."""
         return Read(bytes((byte - self.number) % 256 for byte in sent), tuple(range(len(sent))))
+
+    def take(self, source: Source) -> int:
+        """The next byte."""
+        return (source.byte() - self.number) % 256
 
     def growth(self, size: int) -> int:
         """Maximum number of bytes added to ``size`` bytes."""
@@ -210,6 +247,8 @@ class Insertion:
 
 
 Stage = Escaping | Insertion | Cobs | Digits | Pair | Add
+#: Codings that represent each byte on its own, so that a receiver can decode as it reads.
+Bytewise = Escaping | Digits | Pair | Add
 
 
 def stage(coding: stated.Coding) -> Stage:

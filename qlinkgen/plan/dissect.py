@@ -15,6 +15,7 @@ from typing import assert_never
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.coding import Bytewise
 from qlinkgen.plan.content import BadContent, MoreNeeded, broken, measure
 from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator, Hunt
 from qlinkgen.plan.fields import Fields
@@ -35,7 +36,7 @@ from qlinkgen.plan.parts import (
     gathered,
 )
 from qlinkgen.plan.payload import Member, Step
-from qlinkgen.plan.reading import BadFrame, Cursor, Incomplete, is_wrong
+from qlinkgen.plan.reading import BadFrame, Cursor, Incomplete, is_wrong, stuffed_parts
 from qlinkgen.plan.spans import Around, Cell, Dissection, Fault, Rule, Span
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing
 from qlinkgen.plan.tree import MessagePlan, Plan
@@ -80,8 +81,10 @@ def request_size(plan: Plan, wire: bytes) -> int:
 class _Cursor(Cursor):
     """Takes a wrong inserted byte as a byte of the frame and continues."""
 
-    def __init__(self, wire: bytes, at: int, stuffing: FrameStuffing | None, *, hunting: bool) -> None:
-        super().__init__(wire, at, stuffing.rule if stuffing else None, hunting=hunting)
+    def __init__(
+        self, wire: bytes, at: int, stuffing: FrameStuffing | None, coding: Bytewise | None, *, hunting: bool
+    ) -> None:
+        super().__init__(wire, at, stuffing.rule if stuffing else None, hunting=hunting, coding=coding)
         #: Offsets of wrong inserted bytes.
         self.wrong: list[int] = []
         #: Offset of a new frame inside this one.
@@ -113,9 +116,11 @@ class _Walk:
         stuffing = self.frame.transparency
         self.whole = stuffing if isinstance(stuffing, FrameStuffing) else None
         self.alone = stuffing if isinstance(stuffing, PayloadStuffing) else None
-        parts = self.envelope.between(self.whole.front, self.whole.back) if self.whole else ()
-        self.stuffed = {part.name for part in parts}
-        self.cursor = _Cursor(wire, 0, self.whole, hunting=isinstance(self.frame.receiver, Hunt))
+        coded = isinstance(stuffing, Coded) and not self.frame.whole
+        self.coding = stuffing.bytewise if isinstance(stuffing, Coded) and coded else None
+        self.stuffed = {part.name for part in stuffed_parts(self.frame)}
+        hunting = isinstance(self.frame.receiver, Hunt)
+        self.cursor = _Cursor(wire, 0, self.whole, self.coding, hunting=hunting)
         self.message: MessagePlan | None = None
         self.number: int | None = None
         self.address: int | None = None
@@ -224,7 +229,9 @@ class _Walk:
         taken = len(self.cursor.places)
         self.cursor.some(size, stuffed=part.name in self.stuffed)
         places = tuple(self.cursor.places[taken:])
-        data = bytes(self.wire[at] for at in places)
+        coded = self.cursor.coded
+        data = bytes(coded[at][1] if at in coded else self.wire[at] for at in places)
+        self.units |= {at: coded[at][0] for at in places if at in coded}
         self.cells[part.name] = Cell(before.data + data, before.places + places, b"")
         self.wanted[part.name] = len(before.data) + size
 
@@ -293,7 +300,7 @@ class _Walk:
 
     def _left(self) -> int:
         """Number of bytes left, without inserted ones."""
-        cursor = _Cursor(self.wire, self.cursor.at, self.whole, hunting=False)
+        cursor = _Cursor(self.wire, self.cursor.at, self.whole, self.coding, hunting=False)
         cursor.due = self.cursor.due
         if self.cursor.next is None:
             cursor.some(len(self.wire) + 1, stuffed=True)
@@ -373,7 +380,9 @@ class _Walk:
 
     def _after(self) -> None:
         rest = range(self.cursor.at, len(self.wire))
-        if rest:
+        if rest and self.coding and any(self._short(part) for part in self.envelope.parts):
+            self._around(Around.UNCLEAR, rest, "truncated")  # the beginning of a coded byte
+        elif rest:
             kind = "frame" if isinstance(self.frame.end, ByMark) else "length"
             self._fault(kind, Rule.LAST, rest.start, seen=len(rest))
             self._around(Around.AFTER, rest, kind)

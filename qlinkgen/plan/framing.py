@@ -271,7 +271,7 @@ def _delimited(whole: DelimitedFrame, direction: Direction) -> FramePlan:
 
 def _transparency(frame: DelimitedFrame) -> Transparency:
     stuffing = frame.stuffing
-    if frame.part("terminator") or frame.ends_idle:
+    if frame.coding or frame.part("terminator") or frame.ends_idle:
         return _coded(frame)
     if stuffing is None:
         return Plain()

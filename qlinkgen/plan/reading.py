@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import assert_never
 
-from qlinkgen.plan.coding import Insertion
+from qlinkgen.plan.coding import Bytewise, Insertion
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure
 from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator, Rescan
 from qlinkgen.plan.framing import FramePlan
@@ -29,7 +29,7 @@ from qlinkgen.plan.parts import (
     PayloadPart,
     gathered,
 )
-from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing
+from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing
 from qlinkgen.plan.tree import MessagePlan
 
 
@@ -112,12 +112,21 @@ class Taken:
 
 
 class Cursor:
-    """A wire offset; reads bytes and skips inserted ones."""
+    """A wire offset; reads bytes, skips inserted ones, and decodes coded ones."""
 
-    def __init__(self, wire: bytes, at: int, rule: Insertion | None, *, hunting: bool = False) -> None:
-        """``rule`` applies to the stuffed parts, None if the frame is not stuffed as a whole."""
+    def __init__(
+        self,
+        wire: bytes,
+        at: int,
+        rule: Insertion | None,
+        *,
+        hunting: bool = False,
+        coding: Bytewise | None = None,
+    ) -> None:
+        """``rule`` or ``coding`` apply to the stuffed parts, None if the frame is not stuffed as a whole."""
         self._wire = wire
         self._rule = rule
+        self._coding = coding
         self._hunting = hunting
         self._recent = b""
         self.at = at
@@ -126,10 +135,14 @@ class Cursor:
         #: Offsets of the bytes taken, and of the inserted ones between them.
         self.places: list[int] = []
         self.inserted: list[int] = []
+        #: All offsets of each coded byte, and its value, by its first offset.
+        self.coded: dict[int, tuple[range, int]] = {}
 
     def take(self, size: int, *, stuffed: bool) -> bytes:
         """Bytes of a part. Raises Incomplete, or BadFrame for a wrong inserted byte."""
         taken = b""
+        if self._coding is not None and stuffed:
+            return bytes(self._decoded(self._coding) for _ in range(size))
         rule = self._rule if stuffed else None
         while len(taken) < size:
             self._pass_inserted()
@@ -141,6 +154,29 @@ class Cursor:
         if not stuffed:
             self._recent = b""
         return taken
+
+    def _decoded(self, coding: Bytewise) -> int:
+        """The next byte of a coded part."""
+        first = self.at
+        try:
+            value = coding.take(self)
+        except Incomplete:
+            self.at = first
+            raise
+        self.places.append(first)
+        self.coded[first] = range(first, self.at), value
+        return value
+
+    def byte(self) -> int:
+        """The next byte on the wire."""
+        return self._byte()
+
+    def miscoded(self, byte: int) -> int:
+        """Raise for a wrong byte of a coding."""
+        at = self.at
+        self.misplaced(again=False)
+        self.at = at
+        return byte
 
     def _run(self, most: int, rule: Insertion | None) -> bytes:
         """The bytes up to the next inserted one."""
@@ -176,6 +212,12 @@ class Cursor:
         return self._wire[self.at - 1]
 
 
+def stuffed_parts(plan: FramePlan) -> tuple[Part, ...]:
+    """The parts that are stuffed or coded together, of a frame that is read from left to right."""
+    way = plan.transparency
+    return plan.envelope.between(way.front, way.back) if isinstance(way, FrameStuffing | Coded) else ()
+
+
 class FrameReader:
     """Reads frames that end by length or by message."""
 
@@ -187,8 +229,8 @@ class FrameReader:
         stuffing = plan.transparency
         self._whole = stuffing if isinstance(stuffing, FrameStuffing) else None
         self._alone = stuffing if isinstance(stuffing, PayloadStuffing) else None
-        parts = self._envelope.between(self._whole.front, self._whole.back) if self._whole else ()
-        self._stuffed = {part.name for part in parts}
+        self._coding = None if plan.whole or not isinstance(stuffing, Coded) else stuffing.bytewise
+        self._stuffed = {part.name for part in stuffed_parts(plan)}
         self._bare = isinstance(plan.receiver, Rescan) and plan.receiver.bare
 
     def read(self, wire: bytes, start: int = 0, *, hunting: bool = False) -> Taken:
@@ -197,7 +239,8 @@ class FrameReader:
         Raises NoFrame, Incomplete or BadFrame.
         """
         rule = self._whole.rule if self._whole else None
-        cursor, taken = Cursor(wire, start, rule, hunting=hunting), Taken()
+        cursor = Cursor(wire, start, rule, hunting=hunting, coding=self._coding)
+        taken = Taken()
         self._identify(taken)
         length = 0
         for part in self._envelope.front:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from qlinkgen.plan.coding import Insertion, Read, Stage
+from qlinkgen.plan.coding import Bytewise, Insertion, Read, Stage
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +74,10 @@ class PayloadStuffing:
 
 @dataclass(frozen=True, slots=True)
 class Coded:
-    """A frame that a terminator ends; its first ``front`` and last ``back`` bytes are not coded.
+    """A frame whose first ``front`` and last ``back`` bytes are not coded.
 
-    The others pass the ``stages`` one after the other; without any they are sent unchanged.
+    The others pass the ``stages`` one after the other; without any they are sent unchanged. A frame whose end
+    follows from its contents has one, which is decoded byte by byte.
     """
 
     stages: tuple[Stage, ...]
@@ -93,6 +94,13 @@ class Coded:
         for stage in self.stages:
             inner += stage.growth(inner)
         return self.front + inner + self.back
+
+    @property
+    def bytewise(self) -> Bytewise:
+        """The only stage of a frame that is decoded as it is read."""
+        (stage,) = self.stages
+        assert isinstance(stage, Bytewise)
+        return stage
 
     def encode(self, frame: bytes) -> bytes:
         """The frame as sent."""

@@ -44,14 +44,10 @@ class CodingBuilder:
         """The codings in the order in which they are applied, and the names of the coded parts."""
         if spec is None:
             return (), ()
-        if not self._silent and not any(part.role == "terminator" for part in self._parts):
-            what = "coding applies only to frames that a terminator ends"
-            hint = "add a part with role: terminator, or use stuffing"
-            needs = (_PATH, ("frame", "parts"))
-            self._report.error("not-applicable", _PATH, what, hint, of_key=True, needs=needs)
-            return (), ()
         many = isinstance(spec, list)
         specs = spec if isinstance(spec, list) else [spec]
+        if not self._silent and not any(part.role == "terminator" for part in self._parts):
+            self._check_open(specs)
         codings = [self._coding(each, (*_PATH, index) if many else _PATH) for index, each in enumerate(specs)]
         for index, coding in enumerate(codings[:-1]):
             if isinstance(coding, Cobs):
@@ -66,6 +62,21 @@ class CodingBuilder:
             else:
                 coded = self._coded(over, path)
         return tuple(each for each in codings if each is not None), coded
+
+    def _check_open(self, specs: Sequence[CodingSpec]) -> None:
+        """Check that a receiver can decode as it reads, since nothing tells the end before."""
+        wrong = ""
+        if len(specs) > 1:
+            wrong = "several codings"
+        elif specs[0].cobs is not None:
+            wrong = "COBS"
+        elif specs[0].insert is not None:
+            wrong = "insert"
+        if wrong:
+            what = f"{wrong} cannot be decoded before the end of a frame is known"
+            hint = "write stuffing" if wrong == "insert" else "add a part with role: terminator"
+            needs = (_PATH, ("frame", "parts"))
+            self._report.error("not-applicable", _PATH, what, hint, of_key=True, needs=needs)
 
     def _error(self, path: Path, what: str, hint: str) -> None:
         self._report.error("bad-coding", path, what, hint, of_key=True)

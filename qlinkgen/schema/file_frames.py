@@ -243,7 +243,7 @@ class CodingSpec(FileMapping):
     )
     add: ByteText | None = Field(default=None, description="Number added to each byte")
     over: list[str] | None = Field(
-        default=None, description="Coded parts; default: all but the first constant and the terminator"
+        default=None, description="Coded parts; default: all but the first constant, up to the terminator"
     )
 
 
@@ -281,7 +281,7 @@ class FrameSpec(Fact):
     stuffing: StuffingSpec | None = Field(default=None, description="Keeps the preamble unique")
     coding: Codings | None = Field(
         default=None,
-        description="How bytes before a terminator travel; a list applies in its order",
+        description="How bytes travel; a list applies in its order",
     )
     marked: MarkedSpec | None = Field(default=None, description="Header and end are marked by a bit")
     packet: Parts | None = Field(default=None, description="No frame: message id, words, checksum")

@@ -60,6 +60,10 @@ _FRAMINGS: Mapping[str, tuple[Sequence[str], str]] = {
         ('start: {text: ":"}', _CODE, _DATA, _LRC, "end: {role: terminator, value: 0D 0A}"),
         "coding: {digits: hex}",
     ),
+    "preamble, length, CRC, escapes": (
+        ("start: 7E", _SIZE, _CODE, _DATA, _CRC),
+        "coding: {escape: 7D, xor: 20, of: [7E, 7D]}",
+    ),
     "a silence alone, CRC": ((_CODE, _DATA, _CRC, "gap: {role: idle, time: 3.5 bytes, alone: true}"), ""),
     "SLIP without a check value": (
         ("open: C0", _CODE, _DATA, "close: {role: terminator, value: C0}"),

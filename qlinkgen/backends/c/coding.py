@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
@@ -39,7 +40,7 @@ class StageView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EndedView:
-    """A frame that a terminator or a silence ends.
+    """A frame that a terminator or a silence ends, or one that is decoded as it is read.
 
     Attributes:
         stages: its codings; the first is applied first.
@@ -52,6 +53,7 @@ class EndedView:
         partial: condition for bytes of a receiver that may begin it.
         step: number of bytes to the next place where it may be.
         kept: number of its bytes that may begin the next frame.
+        head_checks: statements that check a header of which ``at`` bytes are decoded; [] if its end is known.
         flag: its size if it also begins frames, otherwise 0.
         splits: uncoded bytes are not only the first constant and the terminator.
     """
@@ -84,6 +86,7 @@ class EndedView:
     put_trailer: list[str]
     put_check: list[str]
     fills: list[str]
+    head_checks: Sequence[str] = ()
 
     @property
     def writes_trailer(self) -> bool:

@@ -217,6 +217,7 @@ def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
             "kinds": several.kinds,
             "parts": several.parts,
             "ended": None,
+            "coded": None,
             "inserted": None,
         }
         templates: tuple[str, ...] = ("kinds", "wrap", "frame_public")
@@ -231,6 +232,8 @@ def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
             if views.ended:
                 made = ("coding", "wrap_coded") if views.ended.stages else ("frame_plain",)
                 templates = ("place", "values", *made, "scan_ended", "wrap", "frame_public")
+            if views.coded:
+                templates = ("place", "values", "coding", "wrap_coded", "scan_coded", "wrap", "frame_public")
             kind = _RECEIVERS[type(receiver)]
             templates = (*templates[:-1], "ways", templates[-1]) if plan.directed else templates
             each = ways if plan.directed else {}

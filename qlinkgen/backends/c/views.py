@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import assert_never
 
 from qlinkgen.backends.c.check_values import BlocksView, ValueView
@@ -284,6 +284,7 @@ class PartsViews:
     inserted: InsertView | None
     hunt: HuntView | None
     ended: EndedView | None
+    coded: EndedView | None
 
     @property
     def others(
@@ -300,6 +301,7 @@ class PartsViews:
             "inserted": self.inserted,
             "hunt": self.hunt,
             "ended": self.ended,
+            "coded": self.coded,
         }
 
 
@@ -349,6 +351,11 @@ def _parts_views(whole: Plan, plan: Plan, way: str, layouts: Layouts) -> PartsVi
         inserted=_inserted(rule) if rule else None,
         hunt=_hunted(writer, receiver) if isinstance(receiver, Hunt) else None,
         ended=_ended(writer, passed) if plan.frame.whole else None,
+        coded=None
+        if plan.frame.whole or not isinstance(transparency, Coded)
+        else replace(
+            _ended(writer, passed), head_checks=list(writer.head_checks("at", passed, all_there=False))
+        ),
     )
 
 

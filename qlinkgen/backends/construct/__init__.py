@@ -35,7 +35,7 @@ _SUPPORT = {
     "_packed": "BcdInteger PackedField PaddedBytesField PaddedTextField",
     "_frames": "CRC Address AddressBits Blocks Cell Check Constant ConstantBits DelimitedFrame Equal "
     "Fletcher Id IdBits Length Mark MarkedFrame Packet Payload Stuffing Sum Xor messages_of",
-    "_ended": "Add Cobs Digits EndedFrame Escape Pair",
+    "_ended": "Add Cobs CodedFrame Digits EndedFrame Escape Pair",
     "_ffilled": "EqualTo Filled FilledMessage FilledRecord FilledTrimmed FilledVaried FilledVariedRecord "
     "FilledWalked",
     "_fasked": "Asked Told",

@@ -14,6 +14,7 @@ from ._fields import Message, Values
 from ._frames import (
     Address,
     Constant,
+    DelimitedFrame,
     Frame,
     FrameError,
     Id,
@@ -23,6 +24,7 @@ from ._frames import (
     Stuffing,
     _allowed,
     _size,
+    _Wire,
 )
 
 
@@ -40,6 +42,10 @@ class Escape(NamedTuple):
         """The coded bytes."""
         codes = {byte: bytes([self.escape, second]) for byte, second in self.codes}
         return b"".join(codes.get(byte, bytes([byte])) for byte in data)
+
+    def size(self, byte: int) -> int:
+        """Number of coded bytes, of which this is the first."""
+        return 1 + (byte == self.escape)
 
     def remove(self, data: bytes) -> bytes:
         """The decoded bytes."""
@@ -88,6 +94,10 @@ class Digits(NamedTuple):
         """The coded bytes."""
         return data.hex().upper().encode()
 
+    def size(self, byte: int) -> int:
+        """Number of coded bytes, of which this is the first."""
+        return 2 if byte in b"0123456789ABCDEFabcdef" else 1
+
     def remove(self, data: bytes) -> bytes:
         """The decoded bytes."""
         if len(data) % 2 or not all(byte in b"0123456789ABCDEFabcdef" for byte in data):
@@ -101,6 +111,11 @@ class Pair(NamedTuple):
     def add(self, data: bytes) -> bytes:
         """The coded bytes."""
         return bytes(each for byte in data for each in (byte, byte ^ 0xFF))
+
+    def size(self, byte: int) -> int:
+        """Number of coded bytes, of which this is the first."""
+        del byte
+        return 2
 
     def remove(self, data: bytes) -> bytes:
         """The decoded bytes."""
@@ -118,12 +133,19 @@ class Add(NamedTuple):
         """The coded bytes."""
         return bytes((byte + self.number) % 256 for byte in data)
 
+    def size(self, byte: int) -> int:
+        """Number of coded bytes, of which this is the first."""
+        del byte
+        return 1
+
     def remove(self, data: bytes) -> bytes:
         """The decoded bytes."""
         return bytes((byte - self.number) % 256 for byte in data)
 
 
 Coding = Escape | Stuffing | Cobs | Digits | Pair | Add
+#: Codings of each byte on its own.
+Bytewise = Escape | Digits | Pair | Add
 
 
 class EndedFrame(Frame):
@@ -271,3 +293,64 @@ class EndedFrame(Frame):
             stop = at + (size if isinstance(part, Payload) else self.sizes[part.name])
             cells[part.name], at = plain[at:stop], stop
         return cells
+
+
+class _CodedWire(_Wire):
+    """Decodes the bytes of the parts ``over`` as it reads them."""
+
+    def __init__(self, data: bytes, coding: Bytewise, over: Sequence[str]) -> None:
+        super().__init__(data, None, hunt=False)
+        self.coding = coding
+        self.over = over
+
+    def take(self, part: Part, size: int) -> bytes:
+        """See _Wire."""
+        if part.name not in self.over:
+            return super().take(part, size)
+        return b"".join(self._decoded() for _ in range(size))
+
+    def _decoded(self) -> bytes:
+        first = self._byte()
+        more = range(1, self.coding.size(first[0]))
+        return self.coding.remove(first + b"".join(self._byte() for _ in more))
+
+
+class CodedFrame(DelimitedFrame):
+    """A delimited frame whose parts ``over`` are sent in a ``coding``."""
+
+    def __init__(
+        self,
+        parts: Sequence[Part],
+        messages: Iterable[Message],
+        *,
+        coding: Bytewise,
+        over: Sequence[str],
+        address: str = "",
+        bare: bool = False,
+    ) -> None:
+        super().__init__(parts, messages, address=address, bare=bare)
+        names = [part.name for part in parts]
+        sizes = [_size(part) for part in parts]
+        self.coding = coding
+        self.over = over
+        self.front = sum(sizes[: names.index(over[0])])
+        self.back = sum(sizes[names.index(over[-1]) + 1 :])
+
+    def _wire(self, data: bytes) -> _Wire:
+        return _CodedWire(data, self.coding, self.over)
+
+    def wrap(
+        self,
+        message: Message,
+        payload: bytes,
+        address: int = 0,
+        request: bytes = b"",
+        number: int | None = None,
+        *,
+        beside: Values | None = None,
+    ) -> bytes:
+        """See Frame."""
+        plain = super().wrap(message, payload, address, request, number, beside=beside)
+        end = len(plain) - self.back
+        inner = self.coding.add(plain[self.front : end])
+        return plain[: self.front] + inner + plain[end:]

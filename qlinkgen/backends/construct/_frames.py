@@ -702,8 +702,12 @@ class DelimitedFrame(Frame):
     unknown id or an illegal address is detected first.
     """
 
+    def _wire(self, data: bytes) -> _Wire:
+        """The bytes of its parts."""
+        return _Wire(data, self.stuffing, hunt=self.hunt)
+
     def _frame(self, wire: bytes, request: bytes) -> Container:
-        source = _Wire(wire, self.stuffing, hunt=self.hunt)
+        source = self._wire(wire)
         cells: dict[str, bytes] = {}
         numbers: dict[type, int] = {}
         self._identify(cells, numbers)

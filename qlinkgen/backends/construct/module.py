@@ -320,7 +320,8 @@ def _frame(frame: FramePlan, layout: Node, messages: Sequence) -> Call:
             return _ended(frame, layout, messages, address)
         case Rescan():
             bare = (("bare", True),) if frame.receiver.bare else ()
-            return Call("DelimitedFrame", (layout, messages), (*settings, *bare))
+            coded = isinstance(frame.transparency, Coded)
+            return Call("CodedFrame" if coded else "DelimitedFrame", (layout, messages), (*settings, *bare))
         case Marks():
             return Call("MarkedFrame", (layout, messages), settings)
         case InStep():
@@ -375,8 +376,13 @@ def _stage(coding: Stage) -> Call:
 def _stuffing(frame: FramePlan) -> tuple[tuple[str, Node], ...]:
     how = frame.transparency
     match how:
-        case Plain() | SevenBit() | Coded():
+        case Plain() | SevenBit():
             return ()
+        case Coded():
+            if frame.whole:
+                return ()
+            names = tuple(part.name for part in frame.envelope.between(how.front, how.back))
+            return ("coding", _stage(how.bytewise)), ("over", Sequence(names))
         case PayloadStuffing():
             over: tuple[str, ...] = ()
         case FrameStuffing():

@@ -11,11 +11,19 @@ from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, S
 
 @dataclass(frozen=True, slots=True)
 class CodingView:
-    """Definitions of tables; statements that replace ``data`` by coded and decoded bytes, or return None."""
+    """The statements of codings.
+
+    Attributes:
+        tables: definitions.
+        encode: replace ``data`` by the coded bytes.
+        decode: replace it by the decoded bytes, or return None.
+        take: append bytes of ``buf`` from ``at`` to ``frame`` up to ``size``; of one coding.
+    """
 
     tables: list[str]
     encode: list[str]
     decode: list[str]
+    take: list[str]
 
 
 def coding_view(stages: tuple[Stage, ...]) -> CodingView:
@@ -25,6 +33,7 @@ def coding_view(stages: tuple[Stage, ...]) -> CodingView:
         tables=[line for view in views for line in view.tables],
         encode=[line for view in views for line in view.encode],
         decode=[line for view in reversed(views) for line in view.decode],
+        take=views[0].take,
     )
 
 
@@ -35,10 +44,10 @@ def _view(stage: Stage, suffix: str) -> CodingView:
         case Insertion():
             return _insertion(stage)
         case Cobs():
-            return CodingView([], _COBS, _UNCOBS)
+            return CodingView([], _COBS, _UNCOBS, [])
         case Digits():
             decode = ["try:", "    data = unhexlify(data)", "except ValueError:", "    return None"]
-            return CodingView([], ["data = hexlify(data).upper()"], decode)
+            return CodingView([], ["data = hexlify(data).upper()"], decode, _TAKE_DIGITS)
         case Pair():
             return _pair(f"_INVERTED{suffix}")
         case Add():
@@ -51,6 +60,11 @@ def _view(stage: Stage, suffix: str) -> CodingView:
                 ],
                 [f"data = data.translate({table[0]})"],
                 [f"data = data.translate({table[1]})"],
+                [
+                    "data = buf[at : at + size - len(frame)]",
+                    f"frame += data.translate({table[1]})",
+                    "at += len(data)",
+                ],
             )
         case _:
             assert_never(stage)
@@ -77,7 +91,27 @@ def _escaping(stage: Escaping, table: str) -> CodingView:
         "    except LookupError:",
         "        return None",
     ]
-    return CodingView([definition], encode, decode)
+    return CodingView([definition], encode, decode, _take_escaped(stage, table, escape))
+
+
+def _take_escaped(stage: Escaping, table: str, escape: str) -> list[str]:
+    wrong = f"second == 0x{stage.escape:02X}" if stage.mask else f"second not in {table}"
+    return [
+        "while len(frame) < size and at < len(buf):",
+        "    left = size - len(frame)",
+        f"    mark = buf.find({escape}, at, at + left)",
+        "    stop = at + left if mark < 0 else mark",
+        "    frame += buf[at:stop]",
+        "    at = min(stop, len(buf))",
+        "    if mark >= 0:",
+        "        if at + 1 == len(buf):",
+        '            return frame, at + 1, ""',
+        "        second = buf[at + 1]",
+        f"        if {wrong}:",
+        '            return frame, at + 2, "stuffing"',
+        f"        frame += {table}[second]",
+        "        at += 2",
+    ]
 
 
 def _insertion(stage: Insertion) -> CodingView:
@@ -89,7 +123,7 @@ def _insertion(stage: Insertion) -> CodingView:
         "        return None",
         "    data = plain",
     ]
-    return CodingView([], [f"data = data.replace({after}, {both})"], decode)
+    return CodingView([], [f"data = data.replace({after}, {both})"], decode, [])
 
 
 def _pair(table: str) -> CodingView:
@@ -105,7 +139,26 @@ def _pair(table: str) -> CodingView:
         "    return None",
         "data = plain",
     ]
-    return CodingView([f"{table} = bytes(range(255, -1, -1))"], encode, decode)
+    take = [
+        "pairs = buf[at : at + 2 * (size - len(frame))]",
+        f"plain, inverted = pairs[::2], pairs[1::2].translate({table})",
+        "if not plain.startswith(inverted):",
+        "    wrong = next(n for n, byte in enumerate(inverted) if byte != plain[n])",
+        '    return frame + plain[:wrong], at + 2 * wrong + 2, "stuffing"',
+        "frame += inverted",
+        "at += len(pairs)",
+    ]
+    return CodingView([f"{table} = bytes(range(255, -1, -1))"], encode, decode, take)
+
+
+_TAKE_DIGITS = [
+    "digits = buf[at : at + 2 * (size - len(frame))]",
+    'right = len(digits) - len(digits.lstrip(b"0123456789ABCDEFabcdef"))',
+    "frame += unhexlify(digits[: right & ~1])",
+    "if right < len(digits):",
+    '    return frame, at + right + 1, "stuffing"',
+    "at += len(digits)",
+]
 
 
 _COBS = [

@@ -117,13 +117,22 @@ class LengthView:
 
 @dataclass(frozen=True)
 class StuffingView:
-    """Stuffing of ``whole`` frames except their first and last bytes, or of payloads only."""
+    """Stuffing of ``whole`` frames except their first and last bytes, or of payloads only.
+
+    Attributes:
+        coding: in place of the stuffing, None if bytes are inserted.
+        reveals: the byte after which the next one can be wrong; "" if any can, or none.
+        steady: no byte can be wrong.
+    """
 
     whole: bool
     after: str
     insert: str
     front: int
     back: int
+    coding: CodingView | None = None
+    reveals: str = ""
+    steady: bool = False
 
 
 @dataclass(frozen=True)
@@ -260,6 +269,12 @@ class PartsView:
     def check(self) -> CheckView | None:
         """The algorithm of the main check value, None if there is none."""
         return self.main.view if self.main else None
+
+    @property
+    def coding(self) -> CodingView | None:
+        """The coding of its bytes, None if they are sent as they are or stuffed."""
+        way = self.ended or self.stuffing
+        return way.coding if way else None
 
     @property
     def limited(self) -> bool:

@@ -29,6 +29,7 @@ from qlinkgen.model.frame import Silence
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.naming import address_argument, address_attribute
 from qlinkgen.plan.check import Check
+from qlinkgen.plan.coding import Add, Escaping
 from qlinkgen.plan.ends import ByLength, ByMark, ByTerminator, Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import (
@@ -362,8 +363,15 @@ def _quick_id(envelope: Envelope) -> str:
 def _stuffing(plan: Plan) -> StuffingView | None:
     transparency = plan.frame.transparency
     match transparency:
-        case Plain() | SevenBit() | Coded():
+        case Plain() | SevenBit():
             return None
+        case Coded():
+            if plan.frame.whole:
+                return None
+            stage = transparency.bytewise
+            reveals = literal(bytes((stage.escape,))) if isinstance(stage, Escaping) else ""
+            front, back, coding = transparency.front, transparency.back, coding_view(transparency.stages)
+            return StuffingView(True, "", "", front, back, coding, reveals, steady=isinstance(stage, Add))
         case FrameStuffing():
             whole, front, back = True, transparency.front, transparency.back
         case PayloadStuffing():
@@ -386,7 +394,7 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
                     test, no_frame, "constant", f"head[{start or ''}:{end}] != {literal(part.data)}"
                 )
             case LengthPart():
-                whole = isinstance(plan.frame.transparency, FrameStuffing)
+                whole = isinstance(plan.frame.transparency, FrameStuffing | Coded)
                 place = f"_take(buf, start, {end})[1]" if whole else f"start + {end}"
                 bounds = "_MIN_LENGTH <= _length(head) <= _MAX_LENGTH"
                 yield HeadCheck(f"len(head) >= {end} and not {bounds}", f'"length", {place}, b""')

@@ -22,6 +22,26 @@ class Ending:
         return self.codings[0] if len(self.codings) == 1 else self.codings
 
 
+def openly(rng: random.Random, frame: Doc) -> None:
+    """Let a frame with a length or counts travel in a coding that is decoded as it is read."""
+    names = list(frame["parts"])
+    if any({"trim", "every"} & spec.keys() for spec in frame["parts"].values()):
+        return
+    lead = int(frame["parts"][names[0]].get("role") == "constant")
+    kinds: list[Doc] = [
+        *(_escaped(rng).codings[0], _replaced(rng).codings[0]),
+        *({"digits": "hex"}, {"pair": "complement"}, {"add": _hex(rng.randrange(256))}),
+    ]
+    coding = rng.choice(kinds)
+    if rng.random() < 0.4:
+        payload = next(at for at, name in enumerate(names) if frame["parts"][name].get("role") == "payload")
+        first, last = rng.randint(0, payload), rng.randint(payload, len(names) - 1)
+        coding = {**coding, "over": names[first : last + 1]}
+    elif not lead and rng.random() < 0.5:
+        coding = {**coding, "over": names}
+    frame["coding"] = coding
+
+
 def silence(rng: random.Random, parts: Doc) -> None:
     """Let only an idle line end the frame: without terminator and length."""
     gone = [name for name, spec in parts.items() if spec.get("role") in ("terminator", "length")]

@@ -112,17 +112,24 @@ def choose(rng: random.Random, words: _Words) -> Shape:
     if "parts" in shape.frame and not shape.seeds and more.random() < 0.2:
         one_way.add(more, shape.frame, plain=kind == "ended" and "coding" not in shape.frame)
         shape.directed = True
+    _end(rng, more, shape, kind)
+    for key in ("parts", "packet"):
+        parts: Doc = shape.frame.get(key, {})
+        for name, spec in parts.items():
+            parts[name] = _shorter(rng, spec)
+    return shape
+
+
+def _end(rng: random.Random, more: random.Random, shape: Shape, kind: str) -> None:
+    """Add a silence, or a coding that is decoded as it is read, to some frames."""
     if "parts" in shape.frame and rng.random() < 0.15:
         time = rng.choice(("3.5 bytes", "20 ms", "4 bytes"))
         least = {"at_least": rng.choice(("1750 us", "1 ms"))} if rng.random() < 0.5 else {}
         shape.frame["parts"]["silence"] = {"role": "idle", "time": time, **least}
     elif kind == "ended" and more.random() < 0.3:
         endings.silence(more, shape.frame["parts"])
-    for key in ("parts", "packet"):
-        parts: Doc = shape.frame.get(key, {})
-        for name, spec in parts.items():
-            parts[name] = _shorter(rng, spec)
-    return shape
+    elif kind in ("parts", "mixed") and "stuffing" not in shape.frame and more.random() < 0.2:
+        endings.openly(more, shape.frame)
 
 
 def _shorter(rng: random.Random, spec: Doc) -> object:

@@ -70,6 +70,14 @@ class Coding:
             plain, rest = plain + bytes([byte]), rest[size:]
         return plain
 
+    def goes_on(self, sent: bytes) -> bool:
+        """Whether one more byte is needed for the first decoded one."""
+        if len(sent) > 1 or self.kind == "add":
+            return False
+        if self.kind == "digits":
+            return sent in map(bytes, zip(b"0123456789ABCDEFabcdef", strict=True))
+        return self.kind == "pair" or sent == next(iter(self._pairs().values()))[:1]
+
     def _taken(self, sent: bytes) -> tuple[int, int]:
         """The first byte, and how many represent it."""
         if self.kind == "add":

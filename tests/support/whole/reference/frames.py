@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tests.support.whole.reference import checks
-from tests.support.whole.reference.codings import codings
+from tests.support.whole.reference.codings import Coding, codings
 from tests.support.whole.reference.fields import Fields, bits_of, bits_of_type, byte_pieces
 from tests.support.whole.reference.layouts import (
     Message,
@@ -207,6 +207,8 @@ class Frame:
         self.silent = bool(frame.get("silent"))
         self.codings = codings(frame.get("coding"))
         self._over = _coded_names(frame.get("coding"), self.parts, silent=self.silent)
+        #: Names of parts that are decoded as they are read.
+        self.coded_names = [] if self.terminator or self.silent else self._over
         #: Maximum payload size on the wire, including inserted bytes if the length counts them.
         self.most_sent = most + most // len(stuffing.after) if stuffing and stuffing.payload_alone else most
 
@@ -437,7 +439,7 @@ class Frame:
 
     def _stuffed(self, cut: Mapping[str, bytes]) -> bytes:
         wire, run = b"", b""
-        if self.terminator or self.silent:
+        if self.terminator or self.silent or self.codings:
             return self._coded(cut)
         for part in self.parts:
             if self.stuffed(part):
@@ -522,12 +524,12 @@ class Frame:
 def _coded_names(spec: Any, parts: list[Part], *, silent: bool) -> list[str]:
     """Names of the coded parts: all between the first constant and the terminator unless stated."""
     roles, names = [part.role for part in parts], [part.name for part in parts]
-    if "terminator" not in roles and not silent:
+    if "terminator" not in roles and not silent and spec is None:
         return []
     for each in spec if isinstance(spec, list) else [spec or {}]:
         if "over" in each:
             return list(each["over"])
-    end = len(names) if silent else roles.index("terminator")
+    end = roles.index("terminator") if "terminator" in roles else len(names)
     return names[int(roles[0] == "constant") : end]
 
 
@@ -558,6 +560,8 @@ class Cursor:
                 again = self._frame.unique and found == self._frame.stuffing.after[0]
                 raise Refused("truncated" if again else "stuffing", self.at)
             self.pending, self._recent = False, b""
+        if part.name in self._frame.coded_names:
+            return self._decoded(self._frame.codings[0])
         byte = self._byte()
         if self._frame.stuffed(part):
             assert self._frame.stuffing
@@ -569,12 +573,22 @@ class Cursor:
 
     def run(self, part: Part, size: int) -> bytes:
         """The next bytes of a part; all at once if they are not stuffed."""
-        if self.pending or self._frame.stuffed(part):
+        if self.pending or self._frame.stuffed(part) or part.name in self._frame.coded_names:
             return bytes(self.take(part) for _ in range(size))
         if len(self._wire) < self.at + size:
             raise NeedMore(self.at + size)
         self.at += size
         return self._wire[self.at - size : self.at]
+
+    def _decoded(self, coding: Coding) -> int:
+        """The next byte of a coded part."""
+        sent = b""
+        while not sent or coding.goes_on(sent):
+            sent += bytes([self._byte()])
+        try:
+            return coding.decode(sent)[0]
+        except Wrong:
+            raise Refused("stuffing", self.at) from None
 
     def _byte(self) -> int:
         if self.at == len(self._wire):
