@@ -161,6 +161,10 @@ FOUND = {
     "a field called like the type of another, which C++ refuses": _PARTS
     + _BUS
     + "messages:\n  log: {id: 5, fields: {v: u8, uint8_t: u8, int64_t: i64}}\n",
+    "a field that a value adds, which C did not cover by the check value": _COUNTED.replace(
+        "0..40}", "0..40}\n    crc: {type: u8, algorithm: sum8, over: [code, data]}"
+    )
+    + 'messages:\n  log: {id: 5, fields: {on: bool, v: "u8[2]", w: {type: u8, if: on}}}\n',
 }
 
 
@@ -191,6 +195,21 @@ def test_a_payload_that_is_too_long_without_inserted_bytes_is_a_fault_of_the_len
     protocol, faults = loads(text, "whole.yaml")
     assert protocol, faults
     wire = bytes.fromhex("7E 05 05 01 02 03 04 05 00")
+    assert dissect(plan_of(protocol), wire, "message").kind == "length"
+    codec = python.load(protocol)
+    with pytest.raises(codec.DecodeError) as caught:
+        codec.decode(wire)
+    assert caught.value.kind == "length"
+
+
+def test_an_address_is_checked_after_a_payload_that_is_walked() -> None:
+    """Fields that may be absent have their size and value checked one by one, and only then the address."""
+    fields = "{on: bool, v: {type: u16, if: on}}"
+    bus = "bus: {kind: master_slave, nodes: 1..8}\n"
+    text = f"{_HEAD}{_PARTS}{bus}messages:\n  log: {{id: 5, fields: {fields}}}\n"
+    protocol, faults = loads(text, "whole.yaml")
+    assert protocol, faults
+    wire = bytes.fromhex("7E 09 05 02 01 02 08")
     assert dissect(plan_of(protocol), wire, "message").kind == "length"
     codec = python.load(protocol)
     with pytest.raises(codec.DecodeError) as caught:

@@ -74,6 +74,9 @@ class _Sizer:
 
     def _segment(self, segment: Segment) -> list[str]:
         learner, run = self._learner, segment.run
+        if run is None and segment.records is None and segment.presence is not None:
+            # Before its bytes are read: those of which the size is known belong to the payload.
+            learner.lines.append(f"*size += {segment.size}U;")
         for step in segment.steps:
             self._decided(step)
         if segment.records is not None:
@@ -84,7 +87,7 @@ class _Sizer:
                 count = f"{run.name}_count"
                 size = f"{run.item_size}U * {count}" if run.item_size > 1 else count
             least = run.item_size * run.length.minimum if run is not None and segment.presence is None else 0
-            if run is not None or segment.presence is not None:
+            if run is not None:
                 learner.lines.append(f"*size += {size}{f' - {least}U' if least else ''};")
             learner.lines.append(f"at += {size};")
         inner, learner.lines = learner.lines, []
