@@ -75,13 +75,9 @@ class SeparatedDecoder(WalkedDecoder):
     def statements(self) -> list[str]:
         """Lines of the function body."""
         place, payload = self.place, self.message.payload
-        self._tabled = None
-        at = Size(-place.header)
-        for part in place.front:
-            self._part(part, at)
-            at += part.size
         steps, least = text_steps(payload), needed(payload)
-        lines = ["message = _new(cls)", *self._flushed()]
+        unpacked, header = self._front()
+        lines = ["message = _new(cls)", *unpacked]
         start = str(place.header) if place.header else ""
         end = f"-{place.trailer}" if place.trailer else ""
         data = f"{place.data}[{start}:{end}]" if start or end else place.data
@@ -104,7 +100,7 @@ class SeparatedDecoder(WalkedDecoder):
         for part in behind:
             self._part(part, at)
             at += part.size
-        return [*lines, *self._flushed(), "return message"]
+        return [*lines, *header, *self._flushed(), "return message"]
 
     def _text(self, step: TextStep, offset: str) -> list[str]:
         local, target = f"{step.name}_text", f"message.{attribute(step.name)}"

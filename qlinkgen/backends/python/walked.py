@@ -187,12 +187,8 @@ class WalkedDecoder(Decoder):
     def statements(self) -> list[str]:
         """Lines of the function body."""
         place = self.place
-        self._tabled = None
-        at = Size(-place.header)
-        for part in place.front:
-            self._part(part, at)
-            at += part.size
-        lines = ["message = _new(cls)", *self._flushed()]
+        unpacked, header = self._front()
+        lines = ["message = _new(cls)", *unpacked]
         end = f"len({place.data}) - {place.trailer}" if place.trailer else f"len({place.data})"
         lines += [f"at = {place.header}", f"end = {end}"]
         self._walking = True
@@ -203,7 +199,17 @@ class WalkedDecoder(Decoder):
         for part in self._needed_back():
             self._part(part, at)
             at += part.size
-        return [*lines, *self._flushed(), "return message"]
+        return [*lines, *header, *self._flushed(), "return message"]
+
+    def _front(self) -> tuple[list[str], list[str]]:
+        """Statements that unpack the header, and those that check and assign its values, which come last."""
+        self._tabled = None
+        at = Size(-self.place.header)
+        for part in self.place.front:
+            self._part(part, at)
+            at += part.size
+        header, self._values = self._values, []
+        return self._flushed(), header
 
     def _segment(self, segment: Segment) -> list[str]:
         run = segment.run
