@@ -10,6 +10,7 @@ from typing import Literal, get_args
 
 from qlinkgen.model.checksum import Checksum as Algorithm
 from qlinkgen.model.coding import Coding, Escape, Insert
+from qlinkgen.model.condition import Condition
 from qlinkgen.model.fields import Field, Value
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer, pack_chunks
 from qlinkgen.model.texts import Text
@@ -136,6 +137,8 @@ class Part:
     confirmed: bool = True
     #: The direction whose frames have it, None for both.
     only: Direction | None = None
+    #: Tests of values of the header that decide whether a frame has it, () if each has it.
+    when: Condition = ()
     constant: bytes = b""
     shared: bool = False
     scalar: Scalar | None = None
@@ -225,6 +228,11 @@ class DelimitedFrame:
     def directed(self) -> bool:
         """Whether some parts are only in frames of one direction."""
         return any(part.only for part in self.parts)
+
+    @property
+    def conditional(self) -> tuple[Part, ...]:
+        """The parts that a frame has only where values of its header meet a condition."""
+        return tuple(part for part in self.parts if part.when)
 
     @property
     def ways(self) -> tuple[Direction, ...]:

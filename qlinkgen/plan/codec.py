@@ -39,6 +39,7 @@ from typing import assert_never
 
 from qlinkgen.model.message import Direction
 from qlinkgen.plan import content
+from qlinkgen.plan.conditional import Conditional
 from qlinkgen.plan.content import BadContent, Raw, Unsendable
 from qlinkgen.plan.ended import frame_reader
 from qlinkgen.plan.ends import Gaps, Hunt, InStep, Marks, Rescan
@@ -154,7 +155,8 @@ class Codec:
     ) -> dict[str, bytes]:
         """The bytes of each part except check values, and of seeds; ``beside`` are values of the frame.
 
-        ``frame`` is the kind of frame; by default the one for a payload of this size.
+        ``frame`` is the kind of frame; by default the one for a payload of this size. Raises Unsendable for
+        a value that the frame does not have.
         """
         given = Given(len(sent), message.number, address, beside)
         envelope = message.envelope_in(frame or message.frame_for(len(sent)))
@@ -163,6 +165,9 @@ class Codec:
             for part in envelope.parts
             if not isinstance(part, CheckPart | BlocksPart)
         }
+        for each in envelope.conditional:
+            if not each.holds(parts):
+                parts |= _absent(each, beside)
         return {**parts, **dict(message.message.seeds)}
 
     def join(
@@ -303,12 +308,22 @@ class Codec:
         return self.judge(take_packet(message, wire), direction, request)
 
 
+def _absent(conditional: Conditional, beside: Mapping[str, Raw]) -> Mapping[str, bytes]:
+    """The bytes of parts that a frame does not have. Raises Unsendable if one of their values is given."""
+    for member in conditional.values:
+        if (value := beside.get(member.name, member.number.default)) != member.number.default:
+            raise Unsendable(member.name, value)
+    return dict.fromkeys((part.name for part in conditional.parts), b"")
+
+
 def _beside(envelope: Envelope, taken: Taken) -> Mapping[str, int]:
     """The values of a frame. Raises BadFrame."""
     found: dict[str, int] = {}
     for part, member in envelope.values:
-        bits = part.integer.unpack(taken.cells[part.name]) >> member.shift
-        found[member.name] = number = member.number.integer.signed_value(bits & member.number.integer.mask)
+        if envelope.absent(part, taken.cells):
+            found[member.name] = member.number.default
+            continue
+        found[member.name] = number = member.of(part.integer.unpack(taken.cells[part.name]))
         if content.broken(member.conditions, number):
             raise BadFrame("range", taken.end, member.name)
     return found

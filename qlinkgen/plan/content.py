@@ -581,8 +581,7 @@ def _valid(name: str, integer: Integer, rules: tuple[Condition, ...], data: byte
 def _members(step: BitsStep, whole: int, at: int) -> dict[str, Raw]:
     found: dict[str, Raw] = {}
     for member in step.members:
-        integer = member.number.integer
-        value = integer.signed_value(whole >> member.shift & integer.mask)
+        value = member.of(whole)
         if broken(member.conditions, value):
             raise BadContent("range", member.name, at)
         found[member.name] = value

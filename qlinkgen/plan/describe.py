@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from decimal import Decimal
 from fractions import Fraction
 from typing import assert_never
@@ -408,7 +408,9 @@ def part_text(part: Part, frame: FramePlan) -> str:  # noqa: C901  # a case a pa
             what = part.id_name if part.end_id is None else f"{part.end_id} in place of {part.id_name}"
             return f"0x{part.marker:02X}, {part.address_name}, {what}"
         case CellPart():
-            return "; ".join(f"bits {_slot_text(part, slot)}" for slot in part.slots)
+            slots = "; ".join(f"bits {_slot_text(part, slot)}" for slot in part.slots)
+            held = (each for each in frame.envelope.conditional if part in each.parts)
+            return slots + "".join(f"; {_if_text(each.tests)}" for each in held)
         case EqualPart():
             added = f" {part.added:+d}".replace("+", "+ ").replace("-", "- ") if part.added else ""
             return f"{'complement of ' if part.inverted else ''}{part.of.name}{added}"
@@ -606,7 +608,11 @@ def presence_text(presence: Presence) -> str:
     """What decides whether a field is present: ``if kind is 3..5``."""
     if presence.optional:
         return "if bytes are left"
-    return f"if {' and '.join(map(_test_text, presence.when))}"
+    return _if_text(presence.when)
+
+
+def _if_text(tests: Iterable[Test]) -> str:
+    return f"if {' and '.join(map(_test_text, tests))}"
 
 
 def _test_text(test: Test) -> str:

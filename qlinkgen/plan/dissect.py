@@ -201,7 +201,7 @@ class _Walk:
     def _divide(self, front: Sequence[Part]) -> None:
         """Take the parts in wire order."""
         for part in front:
-            self._take(part, part.size)
+            self._take(part, self._size(part))
             if isinstance(part, LengthPart) and not self.no_preamble:
                 self._bound(part)
         self._identify()
@@ -213,8 +213,13 @@ class _Walk:
                 continue
             if isinstance(part, MarkPart) and self._interrupted(part):
                 self.wanted[part.name] = 0
-            self._take(part, self.wanted.get(part.name, part.size))
+            self._take(part, self.wanted.get(part.name, self._size(part)))
         self._identify()
+
+    def _size(self, part: Part) -> int:
+        """Size of a part before stuffing, 0 if the frame does not have it."""
+        cells = {name: cell.data for name, cell in self.cells.items()}
+        return 0 if self.envelope.absent(part, cells) else part.size
 
     def _interrupted(self, part: MarkPart) -> bool:
         """Whether a header occurs in place of the end."""
@@ -236,7 +241,8 @@ class _Walk:
         self.wanted[part.name] = len(before.data) + size
 
     def _take_payload(self) -> None:
-        part, end, trailer = self.envelope.payload, self.frame.end, self.envelope.trailer_size
+        part, end = self.envelope.payload, self.frame.end
+        trailer = sum(map(self._size, self.envelope.back))
         match end:
             case ByLength():
                 length = self._number_in(end.part, end.part.integer)
@@ -455,8 +461,7 @@ class _Walk:
 
     def _member(self, part: CellPart, member: Member, number: int) -> None:
         """Check a value of the frame."""
-        integer, cell = member.number.integer, self._found(part)
-        value = integer.signed_value(number >> member.shift & integer.mask)
+        cell, value = self._found(part), member.of(number)
         wrong = broken(member.conditions, value)
         if wrong:
             self._fault("range", Rule.VALUE, cell.places[0], member, value)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 from qlinkgen.model.frame import ATTRIBUTE
 from qlinkgen.plan.check import Check
+from qlinkgen.plan.conditional import Conditional
 from qlinkgen.plan.parts import (
     AddressPart,
     AddressSlot,
@@ -30,9 +31,31 @@ from qlinkgen.plan.payload import Member
 
 @dataclass(frozen=True)
 class Envelope:
-    """The parts of a frame in wire order, before stuffing."""
+    """The parts of a frame in wire order, before stuffing.
+
+    Attributes:
+        parts: all of them; sizes and offsets are those of a frame that has them all.
+        before: the last parts before the payload, if not every frame has them.
+        after: the last parts of the frame, if not every frame has them.
+    """
 
     parts: tuple[Part, ...]
+    before: Conditional | None = None
+    after: Conditional | None = None
+
+    @property
+    def conditional(self) -> tuple[Conditional, ...]:
+        """The parts that not every frame has."""
+        return tuple(each for each in (self.before, self.after) if each is not None)
+
+    def absent(self, part: Part, cells: Mapping[str, bytes]) -> bool:
+        """Whether a frame with these parts in its header does not have a part."""
+        return any(part in each.parts and not each.holds(cells) for each in self.conditional)
+
+    @property
+    def least_overhead(self) -> int:
+        """Bytes before and after the payload of a frame without conditional parts."""
+        return self.overhead - sum(each.size for each in self.conditional)
 
     @cached_property
     def payload_at(self) -> int:

@@ -246,8 +246,7 @@ class Fields:
             self._member(member, whole, places)
 
     def _member(self, member: Member, whole: int, places: tuple[int, ...]) -> None:
-        integer = member.number.integer
-        number = integer.signed_value(whole >> member.shift & integer.mask)
+        number = member.of(whole)
         self._span(member, places, number, places[0] if broken(member.conditions, number) else None)
 
     def _span(

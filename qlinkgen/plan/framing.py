@@ -25,6 +25,7 @@ from qlinkgen.model.integer import Integer, byte_chunks
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.coding import Insertion, stage
+from qlinkgen.plan.conditional import conditional
 from qlinkgen.plan.ends import (
     ByKind,
     ByLength,
@@ -197,7 +198,9 @@ class FramePlan:
         envelope = self.envelope
         if checked or envelope.check is None:
             return envelope
-        return Envelope(tuple(part for part in envelope.parts if not isinstance(part, CheckPart)))
+        return replace(
+            envelope, parts=tuple(part for part in envelope.parts if not isinstance(part, CheckPart))
+        )
 
 
 # From the model
@@ -249,7 +252,7 @@ def _kinds(frame: FrameKinds, direction: Direction) -> FramePlan:
 def _delimited(whole: DelimitedFrame, direction: Direction) -> FramePlan:
     frame = whole.towards(direction)
     transparency = _transparency(frame)
-    envelope = Envelope(_parts(frame, transparency))
+    envelope = _envelope(frame, transparency)
     address = frame.address
     end: End = ByLength(envelope.length) if envelope.length else ByMessage()
     if stated := frame.part("terminator"):
@@ -295,6 +298,14 @@ def _coded(frame: DelimitedFrame) -> Coded:
     front, back = frame.parts[: coded[0]], frame.parts[coded[-1] + 1 :]
     stages = tuple(map(stage, frame.coding))
     return Coded(stages, sum(part.size for part in front), sum(part.size for part in back))
+
+
+def _envelope(frame: DelimitedFrame, transparency: Transparency) -> Envelope:
+    whole = Envelope(_parts(frame, transparency))
+    when = {part.name: part.when for part in frame.conditional}
+    behind = {name: test for name, test in when.items() if name in {part.name for part in whole.back}}
+    before = {name: test for name, test in when.items() if name not in behind}
+    return replace(whole, before=conditional(whole.parts, before), after=conditional(whole.parts, behind))
 
 
 def _parts(frame: DelimitedFrame, transparency: Transparency) -> tuple[Part, ...]:

@@ -225,6 +225,11 @@ class CellPart(_IntegerPart):
         """The values among its bits."""
         return tuple(slot for slot in self.slots if isinstance(slot, Member))
 
+    @property
+    def initial(self) -> int:
+        """The integer with the defaults of its values, and without anything else."""
+        return sum((each.number.default & each.number.integer.mask) << each.shift for each in self.values)
+
 
 @dataclass(frozen=True, slots=True)
 class EqualPart:

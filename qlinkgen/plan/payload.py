@@ -211,6 +211,11 @@ class Member:
         """Conditions on the number, beyond the limits of its bits."""
         return conditions(self.number)
 
+    def of(self, whole: int) -> int:
+        """Its raw number in the integer that holds it."""
+        integer = self.number.integer
+        return integer.signed_value(whole >> self.shift & integer.mask)
+
 
 @dataclass(frozen=True)
 class BitsStep:

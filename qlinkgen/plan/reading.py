@@ -244,17 +244,25 @@ class FrameReader:
         self._identify(taken)
         length = 0
         for part in self._envelope.front:
-            length = self._head(cursor, part, taken) or length
+            if self._has(part, taken):
+                length = self._head(cursor, part, taken) or length
         self._check_header(cursor, taken)
         sent = self._payload(cursor, taken, length)
         for part in self._envelope.back:
-            if not isinstance(part, BlocksPart):
+            if not isinstance(part, BlocksPart) and self._has(part, taken):
                 taken.cells[part.name] = self._take(cursor, part, part.size)
         self._identify(taken)
         taken.end = cursor.at
         taken.due = bytes((rule.insert,)) if rule and cursor.due else b""
         taken.payload = self._judged(taken, sent)
         return taken
+
+    def _has(self, part: Part, taken: Taken) -> bool:
+        """Whether the frame has a part; if not, its bytes are none."""
+        if self._envelope.absent(part, taken.cells):
+            taken.cells[part.name] = b""
+            return False
+        return True
 
     def _take(self, cursor: Cursor, part: Part, size: int) -> bytes:
         return cursor.take(size, stuffed=part.name in self._stuffed)
@@ -359,7 +367,7 @@ class FrameReader:
     def _judged(self, taken: Taken, sent: bytes) -> bytes:
         """The unstuffed payload; checks the constants and derived numbers after it."""
         for part in self._envelope.back:
-            if is_wrong(part, taken.cells):
+            if not self._envelope.absent(part, taken.cells) and is_wrong(part, taken.cells):
                 raise BadFrame("frame", taken.end)
         if self._alone is None:
             return sent

@@ -75,7 +75,7 @@ class MessagePlan:
     @property
     def least_frame(self) -> int:
         """Minimum size of its frame before stuffing."""
-        return self.envelope_in(self.frame_for(self.payload.least)).overhead + self.payload.least
+        return self.envelope_in(self.frame_for(self.payload.least)).least_overhead + self.payload.least
 
     @property
     def most_frame(self) -> int:

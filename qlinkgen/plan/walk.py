@@ -154,8 +154,7 @@ class Walk:
             case BitsStep():
                 whole = step.integer.unpack(data)
                 for member in step.members:
-                    integer = member.number.integer
-                    self._note(member.name, integer.signed_value(whole >> member.shift & integer.mask))
+                    self._note(member.name, member.of(whole))
             case CountStep():
                 self._count(step, step.integer.unpack(data), at)
             case ConstantStep() | ReservedStep() | FilledStep() | BytesStep() | ItemsStep():

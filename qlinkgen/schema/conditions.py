@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from qlinkgen.model.condition import Condition, Test, exclusive, turning_points
@@ -68,14 +68,14 @@ class ConditionBuilder:
         if None not in ranges:
             yield Test(value.name, tuple(each for each in ranges if each), text.negated)
 
+    def _values(self, field: Field, before: Sequence[Field]) -> Mapping[str, Value]:
+        """The values that a condition on a field may be about, by name."""
+        found = (each for each in values_of(before) if each.field.slot != field.slot or not field.slot)
+        return {value.name: value for value in found}
+
     def _tested(self, field: Field, text: TestText, before: Sequence[Field]) -> Value | None:
         """The value that a condition names: of an earlier field, or of its bits."""
-        key = "switch" if field.slot else "if"
-        values = {
-            value.name: value
-            for value in values_of(before)
-            if value.field.slot != field.slot or not field.slot
-        }
+        key, values = "switch" if field.slot else "if", self._values(field, before)
         owner, _, bit = text.field.partition(".")
         value = values.get(bit or owner)
         if value is None or (bit and value.field.name != owner):

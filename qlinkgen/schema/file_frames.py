@@ -181,7 +181,9 @@ class PartSpec(Fact):
     words: Annotated[StrictInt, Field(ge=1, le=8)] = Field(1, description="Size of the words that a sum adds")
     rejected: Id | None = Field(default=None, description="Check value that rejects an unknown command")
     when: AnyCondition | None = Field(
-        default=None, alias="if", description="Direction of the frames that have it: {direction: response}"
+        default=None,
+        alias="if",
+        description="Frames that have it: of a direction, or with values in the header",
     )
 
     @property

@@ -11,6 +11,7 @@ from qlinkgen.schema.coding import CodingBuilder
 from qlinkgen.schema.file_frames import FrameSpec, KindSpec, MarkedSpec, PartSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
+from qlinkgen.schema.part_conditions import PartConditions, check_conditions
 from qlinkgen.schema.part_directions import check_directions
 from qlinkgen.schema.parts import PartBuilder
 from qlinkgen.schema.pieces import MAX_ID_BITS, placed
@@ -144,6 +145,7 @@ class FrameBuilder:
                 for name, part in specs.items()
             )
         )
+        parts = PartConditions(specs, path, self._report).added(parts)
         stuffed, coded_as = (spec.stuffing, spec.coding) if isinstance(spec, FrameSpec) else (None, None)
         stuffing = build_stuffing(stuffed, parts, self._parts, self._report) if stuffed else None
         codings = CodingBuilder(parts, self._parts, self._report, silent=bool(silence and silence.alone))
@@ -168,6 +170,7 @@ class FrameBuilder:
         if self._is_circular(frame, path):
             return False
         self._check_length(frame, path)
+        check_conditions(frame, path, self._report)
         check_unique(frame, self._report)
         check_terminator_part(frame, self._report)
         if frame.ends_idle:

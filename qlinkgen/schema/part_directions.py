@@ -18,7 +18,7 @@ _COMMON = ("payload", "message", "address", "direction", "length", "terminator",
 
 def direction_of(spec: PartSpec, report: Reporter, path: Path) -> Direction | None:
     """The direction whose frames have a part, None for both."""
-    if spec.when is None:
+    if spec.when is None or not any(test.field == "direction" for test in spec.when):
         return None
     place, name = (*path, "if"), path[-1]
     roles = [spec.told, *(bits.role for bits in (spec.bits or {}).values())]
@@ -32,8 +32,8 @@ def direction_of(spec: PartSpec, report: Reporter, path: Path) -> Direction | No
         found = [each for each in _DIRECTIONS if (each in named) != test.negated]
         if named <= {*_DIRECTIONS} and len(found) == 1:
             return found[0]
-    what = f"only the direction can decide whether a frame has {name}"
-    hint = "write {direction: request} or {direction: response}"
+    what = f"the direction and nothing else must decide whether a frame has {name}"
+    hint = "write {direction: request} or {direction: response}, or name other values"
     report.error(_RULE, place, what, hint, of_key=True)
     return None
 

@@ -160,9 +160,16 @@ _ALL = (
     ),
     Rule(
         "part-direction",
-        "A part with `if` is in all frames of one direction, and in none of the other.",
-        "Only the direction decides, and one receiver finds the frames of both: they begin alike and have "
+        "A part whose `if` names the direction is in all frames of one direction, and in none of the other.",
+        "Nothing else decides, and one receiver finds the frames of both: they begin alike and have "
         "the same roles; what a part counts, covers or equals is there wherever the part is.",
+    ),
+    Rule(
+        "part-condition",
+        "A part that only some frames have holds values, and the header tells whether it is there.",
+        "Values before the payload decide, and a length gives the size of the payload. Such parts come last "
+        "in the header or in the frame, and all there have one condition; no length counts them. A check "
+        "value after the payload may cover those of the header.",
     ),
     Rule(
         "bad-terminated",

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import TypeAlias, assert_never
 
 from qlinkgen.model.fields import Layout, Record, Records, Value
+from qlinkgen.model.frame import DelimitedFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Flags, Float, Length, Scalar
@@ -22,7 +23,12 @@ def random_values(message: Message, rng: random.Random) -> list[Raw]:
 
 def random_beside(protocol: Protocol, message: Message, rng: random.Random) -> dict[str, Raw]:
     """Legal raw values of the frame of a message."""
-    return {value.name: _random(value, rng) for value in protocol.beside(message)}
+    found: dict[str, Raw] = {value.name: _random(value, rng) for value in protocol.beside(message)}
+    numbers = {name: raw for name, raw in found.items() if isinstance(raw, int)}
+    for part in protocol.frame.conditional if isinstance(protocol.frame, DelimitedFrame) else ():
+        if not all(test.holds(numbers[test.value]) for test in part.when):
+            found |= {bits.name: bits.type.default for bits in part.bits if bits.type}
+    return found
 
 
 def random_address(message: Message, rng: random.Random) -> int:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from qlinkgen.backends.c.conditional import holds
 from qlinkgen.backends.c.crc import CheckView, render
 from qlinkgen.backends.c.names import grouped, unsigned
 from qlinkgen.backends.c.places import Places, any_of, in_hex, indented, refusal
@@ -140,6 +142,9 @@ class CheckWriter(Places):
         algorithm = self.algorithms[part.check.algorithm]
         loops = self._loops(part, algorithm.key, "body", "0", "payload_end", lead=True)
         updates = self._empty(part) + loops
+        if self.envelope.before and any(re.search(r"\bhead\b", line) for line in updates):
+            test = holds(self, self.envelope.before, "body")
+            updates.insert(0, f"const size_t head = ({test}) ? {self.head}U : {self.least_head}U;")
         if not any("payload_end" in line for line in updates):
             updates.insert(0, "(void)payload_end;")
         seeded = part in self.envelope.seeded
@@ -150,7 +155,7 @@ class CheckWriter(Places):
         if part.check.otherwise is None:
             return []
         return refusal(
-            f"payload_end == {self.head}U", unsigned(part.check.otherwise, part.check.algorithm.width)
+            f"payload_end == {self.head_text}", unsigned(part.check.otherwise, part.check.algorithm.width)
         )
 
     @property

@@ -135,6 +135,8 @@ def _payload_lines(names: Names, own: str, plan: MessagePlan, has_struct: bool) 
     if is_trimmed(plan.payload):
         return _trimmed_lines(names, own, plan, call), "size"
     size, fits = f"{constant}_MAX_SIZE", f"capacity >= {constant}_MAX_FRAME_SIZE"
+    if plan.envelope.conditional:
+        fits = f"{own}_fits_(capacity, {size})"
     lines = []
     if message.variable:
         size = size_terms(message, "message->")

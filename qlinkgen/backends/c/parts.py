@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.backends.c import filled
 from qlinkgen.backends.c.check_values import CheckWriter
 from qlinkgen.backends.c.checks import as_unsigned, from_unsigned, refused_before_sending
+from qlinkgen.backends.c.conditional import ConditionalView, holds, refused
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.backends.c.places import any_of, in_hex, refusal, shifted
 from qlinkgen.model.naming import member
+from qlinkgen.plan.conditional import Conditional
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import (
     AddressPart,
@@ -41,11 +43,29 @@ class PartWriter(CheckWriter):
 
     def put_header(self, place: str, sent: str) -> list[str]:
         """Statements that write the header; ``place`` is the body."""
-        return [line for part in self._front() for line in self._put(part, place, place, sent)]
+        return [line for part in self._always(self._front()) for line in self._put(part, place, place, sent)]
 
     def put_trailer(self, place: str, header: str) -> list[str]:
         """Statements that write parts after the payload, which ends at ``place``."""
-        return [line for part in self.envelope.back for line in self._put(part, place, header, "")]
+        return [
+            line for part in self._always(self.envelope.back) for line in self._put(part, place, header, "")
+        ]
+
+    def _always(self, parts: Iterable[Part]) -> list[Part]:
+        """Those parts that each frame has."""
+        return [part for part in parts if all(part not in each.parts for each in self.envelope.conditional)]
+
+    def conditional(self, found: Conditional | None, place: str) -> ConditionalView | None:
+        """Parts that only some frames have; those after the payload begin at ``place``."""
+        if found is None:
+            return None
+        return ConditionalView(
+            sent=holds(self, found, "wire"),
+            received=holds(self, found, "body"),
+            size=found.size,
+            put=[line for part in found.parts for line in self._put(part, place, "wire", "")],
+            refused=refused(found),
+        )
 
     @property
     def reads_tail(self) -> bool:
@@ -113,15 +133,18 @@ class PartWriter(CheckWriter):
     def get_values(self) -> list[str]:
         """Statements that read the values of a received frame; those that it does not have get defaults."""
         lines = []
-        if {name for each in self.every for name in _names(each)} != _names(self.envelope):
+        others = {name for each in self.every for name in _names(each)} != _names(self.envelope)
+        if others or self.envelope.conditional:
             lines += ["{", f"    const {self.prefix}_parts_t initial = {self.prefix.upper()}_PARTS_INIT;"]
             lines += ["    frame->parts = initial;", "}"]
         for part, each in self.envelope.values:
             kind = unsigned_type(each.bits)
-            found = self._taken(self.get(part), each, whole=each.bits == part.integer.bits)
+            found = self.taken(self.get(part), each, whole=each.bits == part.integer.bits)
             raw = found if each.number.meaning == "bool" else f"({kind}){found}"
             value = from_unsigned(each.number, raw, self.layouts)
-            lines.append(f"frame->parts.{member(each.name)} = {value};")
+            line = f"frame->parts.{member(each.name)} = {value};"
+            tests = [holds(self, one, "body") for one in self.envelope.conditional if part in one.parts]
+            lines += [f"if ({tests[0]}) {{", f"    {line}", "}"] if tests else [line]
         return lines
 
     # From the wire
@@ -139,7 +162,7 @@ class PartWriter(CheckWriter):
         ``counted`` bytes of the body have been received: any number, or one more in each pass.
         """
         reached = f"{counted} {'>=' if all_there else '=='} "
-        for part in self._front():
+        for part in self._always(self._front()):
             end = self._at(part) + part.size
             match part:
                 case ConstantPart():
@@ -158,11 +181,27 @@ class PartWriter(CheckWriter):
                     raise AssertionError(f"{part.name} is not a part of a header")
                 case _:
                     assert_never(part)
-        if self.envelope.header_checks:
+        if self.envelope.header_checks and not self.envelope.before:
             yield f"if ({reached}{self.head}U) {{"
-            for check in self.envelope.header_checks:
-                yield from (f"    {line}" for line in self.judge(check, "body", "body", "0U"))
+            yield from (f"    {line}" for line in self._judged_header())
             yield "}"
+
+    def late_checks(self, counted: str) -> list[str]:
+        """Statements that verify check values of a header whose size is the variable `head`."""
+        if not (self.envelope.header_checks and self.envelope.before):
+            return []
+        upper = self.prefix.upper()
+        return [
+            f"if ({counted} < head) {{",
+            "    *used = head;",
+            f"    return {upper}_ERROR_TRUNCATED;",
+            "}",
+            *self._judged_header(),
+        ]
+
+    def _judged_header(self) -> Iterator[str]:
+        for check in self.envelope.header_checks:
+            yield from self.judge(check, "body", "body", "0U")
 
     def _number_checks(self, part: Part, reached: str, directed: str) -> Iterator[str]:
         for test in self._wrong(part):
@@ -238,7 +277,7 @@ class PartWriter(CheckWriter):
         match part:
             case CellPart():
                 for slot in part.constants:
-                    found = self._taken(self.get(part), slot, whole=slot.bits == part.integer.bits)
+                    found = self.taken(self.get(part), slot, whole=slot.bits == part.integer.bits)
                     tests = [
                         f"{found} != {unsigned(each, slot.bits, hexadecimal=True)}" for each in slot.values
                     ]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.model.naming import address_member
+from qlinkgen.plan.conditional import Selector
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import Bits, Numeric, Part, Slot
@@ -120,6 +121,16 @@ class Places:
         """Size of the header of a body."""
         return self.envelope.header_size - len(self.lead)
 
+    @property
+    def least_head(self) -> int:
+        """The same without the parts that only some frames have."""
+        return self.head - (self.envelope.before.size if self.envelope.before else 0)
+
+    @property
+    def head_text(self) -> str:
+        """Size of the header of a body as an expression: a variable if it differs among frames."""
+        return "head" if self.envelope.before else f"{self.head}U"
+
     def parts(self) -> tuple[Part, ...]:
         """The parts of a body."""
         return self.envelope.parts[1:] if self.lead else self.envelope.parts
@@ -135,7 +146,7 @@ class Places:
         return (f"({kind})({' | '.join(terms)})" if len(terms) > 1 else terms[0]) if terms else "0U"
 
     def _piece(self, bits: Bits, kind: str) -> str:
-        return f"({kind}){self._taken(self.get(bits.part), bits, whole=bits.whole)}"
+        return f"({kind}){self.taken(self.get(bits.part), bits, whole=bits.whole)}"
 
     def get(self, part: Numeric, place: str = "") -> str:
         """The expression for the integer of a part, in a body or after the payload."""
@@ -144,7 +155,7 @@ class Places:
         return found if part.size > 1 or mask == 0xFF else f"({found} & {in_hex(mask)})"
 
     @staticmethod
-    def _taken(found: str, bits: Bits | Slot, *, whole: bool) -> str:
+    def taken(found: str, bits: Bits | Slot | Selector, *, whole: bool) -> str:
         """The bits of an integer."""
         if whole:
             return found
@@ -164,6 +175,14 @@ class Places:
     def _place(self, part: Part, start: str, payload_end: str, *, after: bool = False) -> str:
         if after and part is self.envelope.payload:
             return payload_end
+        before = self.envelope.before
+        if before and part is self.envelope.payload:
+            return self.head_text
+        if before and part in before.parts:
+            place = self._at(part) + (part.size if after else 0)
+            if place in (self.least_head, self.head):
+                return f"{place}U" if place == self.least_head else self.head_text
+            return f"(({self.head_text} > {self.least_head}U) ? {place}U : {self.least_head}U)"
         base = payload_end if part in self.envelope.back else start
         return added(base, self._at(part) + (part.size if after else 0))
 

@@ -10,6 +10,7 @@ from typing import assert_never
 
 from qlinkgen.backends.c.check_values import BlocksView, ValueView
 from qlinkgen.backends.c.coding import EndedView, stage_views
+from qlinkgen.backends.c.conditional import ConditionalView
 from qlinkgen.backends.c.crc import CheckView
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned_type
@@ -200,8 +201,19 @@ def _name(variable: str, lines: Sequence[str]) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlainView:
-    """Wrap and scan for frames whose header is sent unstuffed; all lists are statements."""
+    """Wrap and scan for frames whose header is sent unstuffed; all lists are statements.
 
+    Attributes:
+        header: size of the header, a variable if ``before`` is not None.
+        least_header: the same of a frame without the parts of ``before``.
+        overhead: bytes before and after the payload of a frame without conditional parts.
+    """
+
+    header: str
+    least_header: int
+    overhead: int
+    before: ConditionalView | None
+    after: ConditionalView | None
     put_header: list[str]
     put_trailer: list[str]
     put_check: list[str]
@@ -209,11 +221,17 @@ class PlainView:
     update_sent: list[str]
     update_received: list[str]
     head_checks: list[str]
+    late_checks: list[str]
 
     @property
     def writes_end(self) -> bool:
         """Whether bytes after the payload are written here."""
-        return _name("end", (*self.put_trailer, *self.put_check, *self.fills))
+        return self.after is not None or _name("end", (*self.put_trailer, *self.put_check, *self.fills))
+
+    @property
+    def conditional(self) -> list[ConditionalView]:
+        """The parts that only some frames have."""
+        return [each for each in (self.before, self.after) if each]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -340,10 +358,10 @@ def _parts_views(whole: Plan, plan: Plan, way: str, layouts: Layouts) -> PartsVi
         algorithms=list(writer.algorithms.values()),
         f=frame,
         place=PlaceView(
-            tailed=rule is not None or body_size > 0,
-            tail=envelope.trailer_size,
+            tailed=rule is not None or body_size > 0 or envelope.before is not None,
+            tail=envelope.trailer_size - (envelope.after.size if envelope.after else 0),
             header=envelope.header_size,
-            overhead=envelope.overhead,
+            overhead=envelope.least_overhead,
         ),
         parts=parts_view(writer, plan.frame.max_wire),
         plain=None if stuffing else plain_view(writer, passed),
@@ -376,7 +394,7 @@ def parts_view(writer: PartWriter, max_wire: int) -> PartsView:
         wrong_tail=writer.wrong_tail("end"),
         check_differs=writer.check_differs("end", "value"),
         values=writer.values,
-        judges=writer.judges("body", "end", f"{'sent' if writer.blocks else 'payload'} + {writer.head}U"),
+        judges=writer.judges("body", "end", f"{'sent' if writer.blocks else 'payload'} + {writer.head_text}"),
         inline=writer.alone is not None,
         blocks=writer.blocks,
         identified_late=writer.reads_tail,
@@ -388,15 +406,21 @@ def parts_view(writer: PartWriter, max_wire: int) -> PartsView:
 
 def plain_view(writer: PartWriter, directed: str) -> PlainView:
     """The view of a frame whose header is sent unstuffed."""
-    header, received = writer.envelope.header_size, "sent" if writer.blocks else "payload"
+    header, received = writer.head_text, "sent" if writer.blocks else "payload"
     return PlainView(
+        header=header,
+        least_header=writer.least_head,
+        overhead=writer.envelope.least_overhead,
+        before=writer.conditional(writer.envelope.before, "wire"),
+        after=writer.conditional(writer.envelope.after, "end"),
         put_header=writer.put_header("wire", "size" if writer.blocks else "sent"),
         put_trailer=writer.put_trailer("end", "wire"),
         put_check=writer.put_check("end", "value"),
-        fills=writer.fills("wire", "end", f"{header}U + sent"),
-        update_sent=writer.covered_loops("wire", "0", f"{header}U + sent"),
-        update_received=writer.covered_loops("wire", "0", f"{received} + {header}U"),
+        fills=writer.fills("wire", "end", f"{header} + sent"),
+        update_sent=writer.covered_loops("wire", "0", f"{header} + sent"),
+        update_received=writer.covered_loops("wire", "0", f"{received} + {header}"),
         head_checks=list(writer.head_checks("size", directed, all_there=True)),
+        late_checks=writer.late_checks("size"),
     )
 
 

@@ -38,6 +38,7 @@ _SUPPORT = {
     "_ended": "Add Cobs CodedFrame Digits EndedFrame Escape Pair",
     "_ffilled": "EqualTo Filled FilledMessage FilledRecord FilledTrimmed FilledVaried FilledVariedRecord "
     "FilledWalked",
+    "_fconditional": "ConditionalFrame Present",
     "_fasked": "Asked Told",
     "_frecords": "Record",
     "_ftexts": "BetweenField Separated TextNumber",

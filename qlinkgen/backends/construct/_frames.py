@@ -445,7 +445,7 @@ class Frame(Construct):
                 cells[part.name] = bytes(part.integer.build(whole))
             else:
                 cells[part.name] = self._cell(part, shown, sent, address, cells)
-        cells |= message.seeds
+        cells = self._settled(cells) | message.seeds
         left = self.checks if message.checksum else []
         while left:  # a check value may cover others
             names = {part.name for part in left}
@@ -462,6 +462,10 @@ class Frame(Construct):
             data = b"".join(cells[name] for name in inner)
             cells |= dict.fromkeys(inner, b"") | {inner[0]: stuffing.add(data)}
         return b"".join(cells[part.name] for part in self.parts)
+
+    def _settled(self, cells: dict[str, bytes]) -> dict[str, bytes]:
+        """The parts as sent."""
+        return cells
 
     def _cell(
         self,
@@ -527,8 +531,9 @@ class Frame(Construct):
     def _frame(self, wire: bytes, request: bytes) -> Container:
         raise NotImplementedError
 
-    @staticmethod
-    def _compare(check: Check, cells: Mapping[str, bytes], request: bytes) -> None:
+    def _compare(
+        self, check: Check, cells: Mapping[str, bytes], request: bytes
+    ) -> None:
         sent, expected = cells[check.name], check.value(cells, request)
         if check.differs(cells, expected):
             rejected = check.rejected
@@ -721,13 +726,16 @@ class DelimitedFrame(Frame):
             elif isinstance(part, Constant) and Payload not in numbers:
                 cells[part.name] = self._constant(source, part)
             else:
-                cells[part.name] = source.take(part, _size(part))
+                cells[part.name] = self._taken(source, part, cells)
                 if Payload not in numbers:
                     self._header(part, cells, numbers)
         self._identify(cells, numbers)
         payload = self._plain(cells)
         source.end()
         return self._judged(cells, numbers[Id], payload, numbers.get(Address, 0))
+
+    def _taken(self, source: _Wire, part: Part, cells: Mapping[str, bytes]) -> bytes:
+        return source.take(part, _size(part))
 
     def _verify(self, cells: Mapping[str, bytes]) -> None:
         """Verify check values of the header alone."""

@@ -57,6 +57,7 @@ def live(protocol: Protocol, options: Options | None = None) -> Live:
         "_packed",
         "_ended",
         "_fasked",
+        "_fconditional",
         "_kinds",
     )
     modules = ("construct", *(f"{__package__}.{name}" for name in own))

@@ -24,6 +24,7 @@ from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import record_key
 from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
+from qlinkgen.plan.conditional import Conditional
 from qlinkgen.plan.ends import ByTerminator, Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.framing import FramePlan
@@ -320,6 +321,9 @@ def _frame(frame: FramePlan, layout: Node, messages: Sequence) -> Call:
             return _ended(frame, layout, messages, address)
         case Rescan():
             bare = (("bare", True),) if frame.receiver.bare else ()
+            if present := tuple(map(_present, frame.envelope.conditional)):
+                given = (("present", Sequence(present)), *address, *bare)
+                return Call("ConditionalFrame", (layout, messages), given)
             coded = isinstance(frame.transparency, Coded)
             return Call("CodedFrame" if coded else "DelimitedFrame", (layout, messages), (*settings, *bare))
         case Marks():
@@ -330,6 +334,17 @@ def _frame(frame: FramePlan, layout: Node, messages: Sequence) -> Call:
             raise AssertionError("a silence is found first")
         case _:
             assert_never(frame.receiver)
+
+
+def _present(conditional: Conditional) -> Call:
+    """Parts that only some frames have."""
+    tests = tuple(
+        (each.part.name, each.shift, each.mask, each.test.ranges, each.test.negated)
+        for each in conditional.selectors
+    )
+    initial = tuple(part.integer.pack(part.initial) for part in conditional.parts)
+    names = tuple(part.name for part in conditional.parts)
+    return Call("Present", (Sequence(names), Sequence(initial), Sequence(tests)))
 
 
 def _ended(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator, Sequence
 from typing import assert_never
 
 from qlinkgen.backends.python import integers
@@ -111,10 +113,19 @@ def _covered(envelope: Envelope, part: CheckPart, data: str, end: str = "") -> s
         if isinstance(run, Seed):
             found.append(f"message.{seed_name(run)}")
             continue
-        first, after = _edge(envelope, run[0]), _edge(envelope, run[-1], after=True)
-        cut = f"[{first}:{after if after != end else ''}]"
-        found.append(data if cut == "[:]" else data + cut)
+        for group, always in _groups(envelope, run):
+            first, after = _edge(envelope, group[0]), _edge(envelope, group[-1], after=True)
+            cut = f"[{first}:{after if after != end else ''}]"
+            text = data if cut == "[:]" else data + cut
+            found.append(text if always else f'({text} if _has_before({data}) else b"")')
     return " + ".join(found)
+
+
+def _groups(envelope: Envelope, run: Sequence[Part]) -> Iterator[tuple[Sequence[Part], bool]]:
+    """Adjacent parts of a frame, and whether it always has them."""
+    extra = envelope.before.parts if envelope.before else ()
+    for held, group in itertools.groupby(run, lambda part: part in extra):
+        yield list(group), not held
 
 
 def all_placed(envelope: Envelope, *, early: bool) -> tuple[list[PlacedCheck], list[PlacedCheck]]:

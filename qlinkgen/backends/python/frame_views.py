@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from qlinkgen.backends.python.coding import CodingView
+from qlinkgen.backends.python.conditional import ConditionalView
 
 
 @dataclass(frozen=True)
@@ -225,6 +226,7 @@ class PartsView:
         seeds: attributes of message classes that check values cover.
         blank: the zeros of the check value at the end of the frame, "" if something else is there.
         trim: bytes of a payload that are sent even if they are zeros at its end, None if all are.
+        conditional: parts that only some frames have; code works on frames with all of them.
     """
 
     title: str
@@ -257,8 +259,14 @@ class PartsView:
     values: Sequence[str]
     counter: str
     tail_tests: Sequence[str]
+    conditional: Sequence[ConditionalView] = ()
 
     template = "delimited"
+
+    @property
+    def extra(self) -> int:
+        """Bytes of the header that only some frames have."""
+        return sum(each.size for each in self.conditional if each.place == "before")
 
     @property
     def main(self) -> PlacedCheck | None:

@@ -7,6 +7,7 @@ from typing import assert_never
 
 from qlinkgen.backends.python import integers, pieces
 from qlinkgen.backends.python.coding import coding_view
+from qlinkgen.backends.python.conditional import conditional_view
 from qlinkgen.backends.python.frame_checks import all_placed, check_bytes, check_view, seed_name
 from qlinkgen.backends.python.frame_directions import by_id
 from qlinkgen.backends.python.frame_views import (
@@ -120,9 +121,7 @@ def _zeros(data: bytes) -> str:
 
 def _blank_number(part: Part) -> int:
     """The integer of a part with the defaults of its values, and without anything else."""
-    if not isinstance(part, CellPart):
-        return 0
-    return sum((each.number.default & each.number.integer.mask) << each.shift for each in part.values)
+    return part.initial if isinstance(part, CellPart) else 0
 
 
 def _unique(plan: Plan, receiver: Hunt, title: str, sizes: Sequence[int]) -> UniqueView:
@@ -225,6 +224,7 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
         values=[attribute(member.name) for _, member in envelope.values],
         counter=_counter(plan),
         tail_tests=[test for part in envelope.back for test in _tail_tests(envelope, part)],
+        conditional=[each for place in ("before", "after") if (each := conditional_view(envelope, place))],
     )
 
 

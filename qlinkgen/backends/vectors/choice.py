@@ -95,11 +95,15 @@ class Rule:
         return _fitting_frame(plan, by_value(plan, found))
 
     def beside(self, envelope: Envelope) -> dict[str, Raw]:
-        """The raw values of a frame."""
-        return {
+        """The raw values of a frame; those that it does not have are their defaults."""
+        found = {
             member.name: self._chosen(member.number, self._bits(part.integer) >> member.shift)
             for part, member in envelope.values
         }
+        for each in envelope.conditional:
+            if not all(test.holds(found[test.value]) for test in each.tests):
+                found |= {member.name: member.number.default for member in each.values}
+        return {**found}
 
     def _sends(self, presence: Presence, found: Mapping[str, Raw], *, sent: bool) -> bool:
         """Whether a field that may be absent is sent; an optional one is not if the one before it was not."""

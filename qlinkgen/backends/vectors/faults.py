@@ -146,6 +146,8 @@ class _Frame:
     def changes(self, *, first: bool) -> Iterator[tuple[str, str, bytes]]:
         """All changes to try: name of the part, error, frame."""
         for part in self._envelope.parts:
+            if self._envelope.absent(part, self._cells):
+                continue
             if first or not isinstance(part, ConstantPart | LengthPart | IdPart | CellPart | EqualPart):
                 for what, cells in self._changed(part):
                     yield part.name, what, self._joined(self._derived({**self._cells, **cells}, part))
@@ -341,7 +343,7 @@ class _Frame:
                     return blocks.name
                 at -= size
             else:
-                at -= len(cells[part.name]) if isinstance(part, PayloadPart) else part.size
+                at -= len(cells[part.name]) if part.name in cells else part.size
             if at < 0:
                 return part.name
         return self._envelope.parts[-1].name

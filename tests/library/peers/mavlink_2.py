@@ -12,9 +12,10 @@ __all__ = ["UNKNOWN", "build", "read"]
 
 
 def build(record: Record) -> bytes | None:
-    # It sends no flags.
+    # It sends no flags but that of a signature.
     return None if record["compatible"] else made(record, common)
 
 
 def read(wire: bytes, direction: Direction) -> Record | None:
-    return seen(wire, common)
+    flags = common.MAVLink(None).decode(bytearray(wire)).get_header().incompat_flags
+    return {**seen(wire, common), "signed": bool(flags & common.MAVLINK_IFLAG_SIGNED)}

@@ -21,7 +21,7 @@ from tests.support.whole.reference.layouts import (
     Value,
 )
 from tests.support.whole.reference.special import Packets
-from tests.support.whole.reference.values import Wrong, default_record, encode, holds, meets
+from tests.support.whole.reference.values import Wrong, default_record, encode, holds, meets, met
 
 
 def mark(reference: Reference) -> int:
@@ -47,6 +47,9 @@ def request(reference: Reference, message: Message, rng: random.Random) -> bytes
 def values(message: Message, rng: random.Random, mark: int) -> dict[str, Raw]:
     """Legal values, often bounds and the stuffed byte."""
     found: dict[str, Raw] = {name: _value(kind, rng, mark) for name, kind in message.beside}
+    for name, tests in message.depending:
+        if not met(tests, {each: raw for each, raw in found.items() if isinstance(raw, int)}):
+            found[name] = dict(message.beside)[name].default
     for attempt in range(12):
         inner = _of_slots(message.slots, rng, mark, short=attempt > 1, shortest=attempt > 5, message=message)
         inner = {name: _between(raw, message.barred) for name, raw in inner.items()}

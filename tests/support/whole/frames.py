@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from tests.support.whole import endings, one_way
+from tests.support.whole import conditional, endings, one_way
 from tests.support.whole.endings import Ending
 from tests.support.whole.mixed import Mixture
 from tests.support.whole.reference import checks
@@ -109,9 +109,8 @@ def choose(rng: random.Random, words: _Words) -> Shape:
         shape = _Parts(rng, words).make(hunted=kind == "hunted")
     # Drawn from another source: the schemas of earlier seeds stay what they are.
     more = random.Random(repr(rng.getstate()))
-    if "parts" in shape.frame and not shape.seeds and more.random() < 0.2:
-        one_way.add(more, shape.frame, plain=kind == "ended" and "coding" not in shape.frame)
-        shape.directed = True
+    if "parts" in shape.frame:
+        _conditions(more, shape, plain=kind == "ended" and "coding" not in shape.frame)
     _end(rng, more, shape, kind)
     for key in ("parts", "packet"):
         parts: Doc = shape.frame.get(key, {})
@@ -128,8 +127,22 @@ def _end(rng: random.Random, more: random.Random, shape: Shape, kind: str) -> No
         shape.frame["parts"]["silence"] = {"role": "idle", "time": time, **least}
     elif kind == "ended" and more.random() < 0.3:
         endings.silence(more, shape.frame["parts"])
-    elif kind in ("parts", "mixed") and "stuffing" not in shape.frame and more.random() < 0.2:
+    elif kind in ("parts", "mixed") and _codes(shape.frame) and more.random() < 0.2:
         endings.openly(more, shape.frame)
+
+
+def _codes(frame: Doc) -> bool:
+    """Whether a frame may have a coding."""
+    return "stuffing" not in frame and not any(name in frame["parts"] for name in conditional.NAMES)
+
+
+def _conditions(rng: random.Random, shape: Shape, *, plain: bool) -> None:
+    """Perhaps parts that only some frames have."""
+    if not shape.seeds and rng.random() < 0.2:
+        one_way.add(rng, shape.frame, plain=plain)
+        shape.directed = True
+    if rng.random() < 0.5:
+        conditional.add(rng, shape.frame)
 
 
 def _shorter(rng: random.Random, spec: Doc) -> object:

@@ -10,7 +10,7 @@ from tests.support.whole.reference.asked import CARRIER, Asked, asked
 from tests.support.whole.reference.fields import Fields, bits_of
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.kinds import Kinds, address_of
-from tests.support.whole.reference.layouts import Message, Number
+from tests.support.whole.reference.layouts import Message
 from tests.support.whole.reference.notation import Direction, Doc, load, part_doc, whole_span
 from tests.support.whole.reference.receivers import (
     Event,
@@ -80,25 +80,27 @@ class Reference:
         for frame in (self.frame, self.requests):
             if isinstance(frame, Frame):
                 frame.seeds = {each.number: document.seeds(data, each.name) for each in self.messages}
-        self.messages = tuple(replace(each, beside=self._beside(each)) for each in self.messages)
+        self.messages = tuple(map(self._with_values, self.messages))
         trim = next((spec["trim"] for spec in map(part_doc, parts.values()) if "trim" in spec), None)
         if trim is not None:
             keep = 0 if trim == "zeros" else trim.get("keep", 0)
             self.messages = tuple(replace(each, trim=keep) for each in self.messages)
         self.asked = asked(data, Fields(data, most), self.messages)
         if self.asked is not None:
-            self.messages = (
-                *self.messages,
-                replace(self.asked.carrier, beside=self._beside(self.asked.carrier)),
-            )
+            self.messages = (*self.messages, self._with_values(self.asked.carrier))
 
     def frame_of(self, direction: Direction) -> Frame | Marked | Packets | Kinds:
         """The frame of a direction; only frames of parts can differ."""
         return self.frame if direction == "response" else self.requests
 
-    def _beside(self, message: Message) -> tuple[tuple[str, Number], ...]:
+    def _with_values(self, message: Message) -> Message:
+        """A message with the values of its frame."""
         frame = self.frame_of(message.direction)
-        return frame.beside if isinstance(frame, Frame) else ()
+        if not isinstance(frame, Frame):
+            return message
+        parts = (part for part in frame.parts if part.name in frame.tests)
+        depending = [(name, frame.tests[part.name]) for part in parts for name, *_ in part.values]
+        return replace(message, beside=frame.beside, depending=tuple(depending))
 
     def known(self, direction: Direction) -> dict[int, Message]:
         """The messages of a direction by their number, of several kinds of frame by any."""

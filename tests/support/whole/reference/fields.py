@@ -142,21 +142,23 @@ class Fields:
 
     def _conditional(self, slot: Slot, spec: Doc, before: list[Slot]) -> Slot:
         """The slot with what decides whether it is present."""
-        given = spec.get("if", {})
-        wanted = {given: True} if isinstance(given, str) else given
-        values = dict(values_of(before))
-        tests, holds = [], True
-        for ref, value in wanted.items():
-            name = ref.split(".")[-1]
+        tests = self.tests(spec.get("if", {}))
+        values, holds = dict(values_of(before)), True
+        for name, ranges, excluded in tests:
             number = values[name]
             assert isinstance(number, Number)
-            excluded = str(value).startswith("not ")
-            items = value if isinstance(value, list) else [str(value).removeprefix("not ")]
-            ranges = tuple(self._wanted(each) for each in items)
-            tests.append((name, ranges, excluded))
             holds = holds and any(low <= number.default <= high for low, high in ranges) != excluded
         optional = spec.get("optional", False)
-        return replace(slot, when=tuple(tests), optional=optional, given=holds and not optional)
+        return replace(slot, when=tests, optional=optional, given=holds and not optional)
+
+    def tests(self, given: str | Doc) -> tuple[Test, ...]:
+        """What a condition asks of values."""
+        found = []
+        for ref, value in ({given: True} if isinstance(given, str) else given).items():
+            items = value if isinstance(value, list) else [str(value).removeprefix("not ")]
+            ranges = tuple(self._wanted(each) for each in items)
+            found.append((ref.split(".")[-1], ranges, str(value).startswith("not ")))
+        return tuple(found)
 
     def _wanted(self, item: object) -> tuple[int, int]:
         text = str(item)

@@ -143,10 +143,16 @@ def _cases(check: Part, data: bytes) -> tuple[bytes, ...]:
 
 def _has(spec: object, direction: str) -> bool:
     """Whether the frames of a direction have a part."""
-    if not isinstance(spec, dict) or "if" not in spec:
+    wanted = _directed(spec)
+    if not wanted:
         return True
-    wanted = spec["if"]["direction"]
     return bool(wanted == direction or (wanted.startswith("not ") and wanted[4:] != direction))
+
+
+def _directed(spec: object) -> str:
+    """What the condition of a part asks of the direction, "" if nothing."""
+    given = spec.get("if", {}) if isinstance(spec, dict) else {}
+    return str(given.get("direction", "")) if isinstance(given, dict) else ""
 
 
 def _among(part: Part, names: Collection[str]) -> Part:
@@ -181,8 +187,14 @@ class Frame:
         fields = Fields(document, 0)
         specs = {name: spec for name, spec in frame["parts"].items() if _has(spec, direction)}
         #: Some parts are only in the frames of one direction.
-        self.one_way = any(isinstance(spec, dict) and "if" in spec for spec in frame["parts"].values())
+        self.one_way = any(map(_directed, frame["parts"].values()))
         self.parts = [_among(part_of(name, spec, order, fields), specs) for name, spec in specs.items()]
+        #: Tests of the values that decide whether a frame has a part, by its name.
+        self.tests = {
+            name: fields.tests(spec["if"])
+            for name, spec in specs.items()
+            if isinstance(spec, dict) and "if" in spec and not _directed(spec)
+        }
         self.by_role: Mapping[str, Part] = {part.role: part for part in self.parts[::-1]}
         #: Bytes of attributes of messages, by number of the message.
         self.seeds: dict[int, Mapping[str, bytes]] = {}
@@ -369,7 +381,7 @@ class Frame:
                 cut[part.name] = put(part.pieces, self.derived(part, cut))
             else:
                 cut[part.name] = payload if part.role == "payload" else part.constant
-        cut |= self.seeds.get(number, {})
+        cut |= {**dict.fromkeys(self.lacking(given), b""), **self.seeds.get(number, {})}
         for _ in self.checks:  # so often that those which cover others become right
             for check in self.checks:
                 cut[check.name] = _shown(check, self.check_value(check, cut))
@@ -418,11 +430,32 @@ class Frame:
         found: dict[str, Raw] = {}
         for part in self.parts:
             for name, shift, kind in part.values:
+                if not self.has(part, cut):
+                    found[name] = kind.default
+                    continue
                 raw = get(part.pieces, cut[part.name]) >> shift & (1 << kind.bits) - 1
                 raw -= (raw >> kind.bits - 1) << kind.bits if kind.signed else 0
                 check_range(kind, raw)
                 found[name] = raw
         return found
+
+    def has(self, part: Part, cut: Mapping[str, bytes]) -> bool:
+        """Whether a frame with these parts in its header has a part."""
+        tests = self.tests.get(part.name, ())
+        tested = {name for name, *_ in tests}
+        numbers = dict[str, int]()
+        for each in self.parts if tests else ():
+            for name, shift, kind in each.values:
+                if name in tested:
+                    raw = get(each.pieces, cut[each.name]) >> shift & (1 << kind.bits) - 1
+                    numbers[name] = raw - ((raw >> kind.bits - 1) << kind.bits if kind.signed else 0)
+        return not tests or met(tests, numbers)
+
+    def lacking(self, given: Mapping[str, Raw]) -> list[str]:
+        """Names of the parts that a frame with these values does not have."""
+        numbers = {name: kind.default for part in self.parts for name, _, kind in part.values}
+        numbers |= {name: raw for name, raw in given.items() if isinstance(raw, int)}
+        return [name for name, tests in self.tests.items() if not met(tests, numbers)]
 
     def id_bits(self) -> list[tuple[str, int, int, str]]:
         """The pieces of the message number, the most significant first: part, lowest bit, bits, role."""
@@ -487,7 +520,7 @@ class Frame:
 
     def bad_constant(self, cut: Mapping[str, bytes]) -> bool:
         """Whether a constant or a derived number is wrong."""
-        return any(self.wrong(part, cut) for part in self.parts)
+        return any(self.wrong(part, cut) for part in self.parts if self.has(part, cut))
 
     def wrong(self, part: Part, cut: Mapping[str, bytes]) -> bool:
         """Whether a part is a wrong constant, has one in its bits, or is wrongly derived."""
@@ -631,7 +664,7 @@ class Splitter:
             self._unblock(frame.blocks, payload, cut)
         for part in frame.parts[frame.payload_at + 1 :]:
             if part is not frame.blocks:
-                cut[part.name] = cursor.run(part, part.size)
+                cut[part.name] = cursor.run(part, part.size if frame.has(part, cut) else 0)
         if frame.bad_constant(cut):
             raise Refused("frame", cursor.at)
         return Cut(cut, cursor.at, cursor.pending)
@@ -664,8 +697,8 @@ class Splitter:
         cut |= {payload.name: plain, blocks.name: values}
 
     def _take(self, part: Part, cursor: Cursor, cut: dict[str, bytes]) -> None:
-        data = b""
-        while len(data) < part.size:
+        data, size = b"", part.size if self._frame.has(part, cut) else 0
+        while len(data) < size:
             data += bytes([cursor.take(part)])
             if part.role == "constant" and not part.constant.startswith(data):
                 raise Refused("frame", cursor.at, told=False)
@@ -677,7 +710,7 @@ class Splitter:
             announced = (frame.number("length", cut) or 0) - frame.bias
             if not frame.least <= announced <= frame.most_sent:
                 raise Refused("length", cursor.at)
-        if part.role in ("bits", "derived") and frame.wrong(part, cut):
+        if part.role in ("bits", "derived") and frame.has(part, cut) and frame.wrong(part, cut):
             raise Refused("frame", cursor.at, told=frame.terminator is not None)
         if frame.bare and any(role not in ("constant", "value") for role, *_ in part.bits):
             number, address = frame.number("message", cut), frame.number("address", cut)

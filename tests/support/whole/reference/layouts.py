@@ -309,6 +309,8 @@ class Message:
     checked: bool = True
     #: Values of its frame.
     beside: tuple[tuple[str, Number], ...] = ()
+    #: Of those that some frames do not have: tests of others, which hold where it is there.
+    depending: tuple[tuple[str, tuple[Test, ...]], ...] = ()
     #: Zeros at the end of its payload are not sent after so many bytes; None: all are sent.
     trim: int | None = None
     #: The byte between texts, and the bytes that a text does not have.

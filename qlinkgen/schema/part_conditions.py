@@ -1,0 +1,107 @@
+"""Second pass, parts that only some frames have: values of the header decide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from qlinkgen.model.fields import Field, Value
+from qlinkgen.model.frame import DelimitedFrame, Part
+from qlinkgen.schema.conditions import ConditionBuilder
+from qlinkgen.schema.file_frames import PartSpec
+from qlinkgen.schema.report import Reporter
+from qlinkgen.schema.source import Path
+
+_RULE = "part-condition"
+
+
+class PartConditions(ConditionBuilder):
+    """Adds conditions on values of the header to the parts of a frame."""
+
+    def __init__(self, specs: Mapping[str, PartSpec], path: Path, report: Reporter) -> None:
+        """``specs`` are the parts as written."""
+        super().__init__({}, path, report)
+        self._written = specs
+        self._known: dict[str, Value] = {}
+
+    def added(self, parts: Sequence[Part]) -> tuple[Part, ...]:
+        """The parts with their conditions."""
+        return tuple(self._with_condition(part) for part in parts)
+
+    def _with_condition(self, part: Part) -> Part:
+        texts = self._written[part.name].when or ()
+        if not texts:
+            values = (bits for bits in part.bits if bits.type is not None)
+            self._known |= {
+                bits.name: Value(bits.name, bits.type, bits.doc, part.field) for bits in values if bits.type
+            }
+        if not texts or any(text.field == "direction" for text in texts):
+            return part
+        if not _holds_values(part):
+            what = f"{part.name} holds more than values of a frame"
+            self._error(part.name, "if", what, "let only parts with such values depend on others")
+            return part
+        return replace(part, when=self._condition(Field(part.name, part.field.type), texts, ()))
+
+    def _values(self, field: Field, before: Sequence[Field]) -> Mapping[str, Value]:
+        del field, before
+        return self._known
+
+    def _error(self, field: str, key: str, what: str, hint: str) -> None:
+        place = (*self._path, field)
+        what = what.replace("no field", "no part or bits").replace(
+            "with a value before it", "before it with a value of every frame"
+        )
+        hint = hint.replace("earlier fields", "earlier parts and bits")
+        self._report.error(_RULE, (*place, key), what, hint, of_key=True, needs=(place,))
+        self._report.taint((*place, key))
+
+
+def _holds_values(part: Part) -> bool:
+    """Whether a part holds values of a frame and nothing else; counters are not."""
+    return part.role == "bits" and all(bits.role == "value" and not bits.counting for bits in part.bits)
+
+
+def check_conditions(frame: DelimitedFrame, path: Path, report: Reporter) -> None:
+    """Check that a receiver knows the size of a frame from its header."""
+    if any(report.touched((*path, part.name, "if")) for part in frame.parts):
+        return
+    for part in frame.conditional:
+        if fault := next(_faults(frame, part), None):
+            report.error(_RULE, (*path, part.name, "if"), *fault, of_key=True, needs=(path,))
+
+
+def _faults(frame: DelimitedFrame, part: Part) -> Iterator[tuple[str, str]]:
+    """What a frame with a conditional part cannot have, and the way round."""
+    name, length = part.name, frame.part("length")
+    if length is None:
+        yield f"a frame with {name} has no length", f"add one, or remove the condition of {name}"
+    elif name in length.counts:
+        yield f"{length.name} counts {name}, which not every frame has", "count other parts"
+    if frame.part("terminator"):
+        yield f"a frame with {name} has a terminator", f"remove it, or the condition of {name}"
+    if frame.stuffing or frame.coding:
+        done, what = ("stuffed", "stuffing") if frame.stuffing else ("coded", "coding")
+        yield f"a frame with {name} is {done}", f"remove the {what}, or the condition of {name}"
+    names = [each.name for each in frame.parts]
+    at, payload = names.index(name), names.index(frame.payload.name)
+    following = frame.parts[at + 1 :] if at > payload else frame.parts[at + 1 : payload]
+    if other := next((each.name for each in following if each.when != part.when), ""):
+        where = "it to the end" if at > payload else f"it directly before {frame.payload.name}"
+        yield f"{other} follows {name}, and has another condition or none", f"move {where}"
+    for each in frame.parts:
+        yield from _misuses(each, name, trails=at > payload, early=names.index(each.name) < payload)
+
+
+def _misuses(other: Part, name: str, *, trails: bool, early: bool) -> Iterator[tuple[str, str]]:
+    """How another part depends on one that a frame may not have."""
+    if other.derivation and other.derivation.of == name:
+        yield f"{other.name} follows from {name}, which not every frame has", "let it follow from another"
+    if other.checksum and other.checksum.every:
+        what = f"{other.name} has values for blocks of the payload"
+        yield what, f"remove every, or the condition of {name}"
+    if other.checksum and name in other.checksum.over and (trails or early):
+        hint = f"leave {name} out of over"
+        if not trails:
+            hint += ", or move the check value after the payload"
+        yield f"{other.name} covers {name}, which not every frame has", hint

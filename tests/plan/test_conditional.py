@@ -1,0 +1,92 @@
+"""Parts that only some frames have: targets agree on frames without them, and refuse their values."""
+
+from __future__ import annotations
+
+import functools
+from types import ModuleType
+
+import pytest
+from construct import ConstructError
+
+from qlinkgen.backends import construct
+from qlinkgen.backends.python import load
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.content import Unsendable
+from qlinkgen.plan.dissect import dissect
+from qlinkgen.schema import loads
+
+_SCHEMA = """
+qlinkgen: 1
+protocol: {name: relay, revision: "1", source: Made up}
+byteorder: big
+frame:
+  parts:
+    start: FD
+    length: {type: u8, counts: data}
+    flags: {type: u8, bits: {signed: 0, relayed: 1, grade: {at: 2..4, signed: true}}}
+    code: {role: message, type: u8}
+    hops: {type: u8, if: {relayed: 1, grade: not -4..-2}, default: 7}
+    data: {role: payload, size: 0..32}
+    sum: {type: u8, algorithm: sum8, over: [length, flags, code, hops, data]}
+    seal: {type: u16, if: flags.signed}
+bus: {kind: master_slave}
+defaults: {addressing: none, repeat: safe}
+commands:
+  go: {id: 1, request: {speed: u8}, response: {}}
+"""
+_FRAMES = [
+    ({}, "FD 01 00 01 09 0B"),
+    ({"relayed": 1}, "FD 01 02 01 07 09 14"),
+    ({"relayed": 1, "hops": 2, "grade": -1}, "FD 01 1E 01 02 09 2B"),
+    ({"relayed": 1, "grade": -2}, "FD 01 1A 01 09 25"),
+    ({"signed": 1, "seal": 0x1234}, "FD 01 01 01 09 0C 12 34"),
+    ({"signed": 1, "relayed": 1}, "FD 01 03 01 07 09 15 00 00"),
+]
+
+
+@functools.cache
+def _protocol() -> Protocol:
+    found, faults = loads(_SCHEMA, "relay.yaml")
+    assert not faults
+    assert found is not None
+    return found
+
+
+@functools.cache
+def _module() -> ModuleType:
+    return load(_protocol())
+
+
+@pytest.mark.parametrize(("values", "text"), _FRAMES)
+def test_a_frame_has_what_its_header_says(values: dict[str, int], text: str) -> None:
+    wire, codec = bytes.fromhex(text), Codec(plan_of(_protocol()))
+    expected = {"signed": 0, "relayed": 0, "grade": 0, "hops": 7, "seal": 0} | values
+    assert codec.encode("go.request", {"speed": 9, **values}) == wire
+    assert codec.decode(wire, "request").beside == expected
+    assert _module().GoRequest(speed=9, **values).to_frame() == wire
+    seen = _module().decode_request(wire)
+    assert {name: getattr(seen, name) for name in expected} == expected
+    frame = construct.live(_protocol()).frames["request"]
+    assert frame.build(frame.parse(wire)) == wire
+
+
+@pytest.mark.parametrize("values", [{"hops": 1}, {"seal": 3}, {"relayed": 1, "grade": -3, "hops": 1}])
+def test_a_value_without_a_place_is_refused(values: dict[str, int]) -> None:
+    with pytest.raises(Unsendable):
+        Codec(plan_of(_protocol())).encode("go.request", values)
+    with pytest.raises(_module().EncodeError):
+        _module().GoRequest(**values).to_frame()
+    with pytest.raises(ConstructError):
+        construct.live(_protocol()).frames["request"].build({"message": "go.request", **values})
+
+
+@pytest.mark.parametrize("text", [text for _, text in _FRAMES])
+def test_each_beginning_of_a_frame_is_dissected(text: str) -> None:
+    wire, plan = bytes.fromhex(text), plan_of(_protocol())
+    assert not dissect(plan, wire, "request").faults
+    for size in range(1, len(wire)):
+        found = dissect(plan, wire[:size], "request")
+        assert found.kind == "truncated"
+        assert {place for span in found.spans for place in span.places} == {*range(size)}
