@@ -165,6 +165,9 @@ class Count:
     unit: Literal["items", "bytes"]
     #: Names of fields of constant size whose bytes are counted too.
     beside: tuple[str, ...] = ()
+    #: What it counts is its number * ``scale`` + ``offset``.
+    scale: int = 1
+    offset: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -326,12 +326,19 @@ def filled_number(step: FilledStep, number: int) -> str:
 
 def count_unit(step: CountStep) -> str:
     """The unit of a count."""
-    return "bytes" if step.term.packed or step.term.factor > 1 or step.term.more else "items"
+    if step.unit > 1:
+        return f"units of {step.unit} bytes"
+    return "bytes" if step.term.packed or step.term.factor > 1 or step.term.more > 0 else "items"
 
 
 def counted_text(step: CountStep) -> str:
     """What a count counts: ``samples``, ``samples and 4 more bytes``."""
-    return f"{step.run} and {step.term.more} more bytes" if step.term.more else step.run
+    more = step.term.more
+    if step.unit > 1 and more > 0:
+        return f"{step.run} and {more} more"
+    return (
+        f"{step.run} and {more} more bytes" if more > 0 else f"{step.run}, less {-more}" if more else step.run
+    )
 
 
 def size_text(size: Size) -> str:
@@ -344,7 +351,12 @@ def term_text(term: Term) -> str:
     """The size of a run: ``2*samples``, ``(11*samples + 7) / 8``."""
     product = f"{term.factor}*{term.run}" if term.factor > 1 else term.run
     product = f"({product} + 7) / 8" if term.packed else product
-    return f"{product} + {term.more}" if term.more else product
+    return plus(product, term.more)
+
+
+def plus(number: str, more: int) -> str:
+    """A number plus a constant: ``n + 2``, ``n - 1``, ``n``."""
+    return f"{number} {'+' if more > 0 else '-'} {abs(more)}" if more else number
 
 
 def condition_text(rule: Condition) -> str:
@@ -382,7 +394,7 @@ def sizing_text(each: Sizing) -> str:
 def _counted_text(count: CountStep) -> str:
     number, steps = count.name, count.term.packed or count.scale > 1
     if count.term.more:
-        number = f"({number} - {count.term.more})" if steps else f"{number} - {count.term.more}"
+        number = f"({plus(number, -count.term.more)})" if steps else plus(number, -count.term.more)
     if count.term.packed:
         times, by = count.term.per_byte
         product = f"{times}*{number}" if times > 1 else number

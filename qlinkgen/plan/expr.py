@@ -13,7 +13,7 @@ from qlinkgen.model.integer import packed_size
 class Term:
     """``factor`` bytes for each item of the run ``run``, or bits if they are ``packed`` to whole bytes.
 
-    ``more`` is added to that: bytes that a count counts beside the run.
+    ``more`` is added to that: bytes that a count counts beside the run, less its offset.
     """
 
     run: str

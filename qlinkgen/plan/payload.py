@@ -134,6 +134,8 @@ class CountStep:
     presence: Presence | None = None
     #: It tells the bytes of records of variable size, not their number.
     sized: bool = False
+    #: Bytes or items that it counts as one.
+    unit: int = 1
 
     @property
     def scale(self) -> int:

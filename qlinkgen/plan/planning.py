@@ -196,19 +196,20 @@ class _Planner:
                 return ConstantStep(name, place, scalar.integer, scalar.default, scalar, accepted=accepted)
             case Reserved():
                 return ReservedStep(name, place, scalar.integer, scalar.default, scalar)
-            case Count(run, unit, beside):
+            case Count(run, unit, beside, scale, offset):
                 counted = self._fields[run].type
                 assert isinstance(counted, Blob | Array | Records)
                 term = _term(run, counted) if unit == "bytes" else Term(run, 1)
                 more = sum(self._fields[each].max_size for each in beside)
-                term = replace(term, more=more)
+                # Lint has checked that all of them are multiples of the scale.
+                term = replace(term, factor=term.factor // scale, more=(more - offset) // scale)
                 bounds = Within(term.value(counted.length.minimum), term.value(counted.length.maximum))
                 sized = unit == "bytes" and self._fields[run].walked
                 if sized:
                     least, most = self._fields[run].full_min_size, self._fields[run].max_size
                     most = most if self._limit is None else min(most, self._limit)
                     bounds = Within(more + least, min(scalar.integer.maximum, more + most))
-                return CountStep(name, place, scalar.integer, run, term, bounds, sized=sized)
+                return CountStep(name, place, scalar.integer, run, term, bounds, sized=sized, unit=scale)
             case Checked(algorithm, first, last):
                 return self._filled(name, scalar, place, (first, last), algorithm)
             case Derived(of, inverted, added):

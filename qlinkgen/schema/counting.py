@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from qlinkgen.model.fields import Field
-from qlinkgen.model.types import Count, Scalar
+from qlinkgen.model.fields import Field, Records
+from qlinkgen.model.types import Array, Blob, Count, Scalar
 from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -35,13 +35,34 @@ def _resolved(field: Field, fields: Sequence[Field], specs: Fields, path: Path, 
         report.taint(place)
         return field
     beside = tuple(name for name in names if name != varying[0])
-    return replace(field, type=replace(kind, role=Count(varying[0], "bytes", beside)))
+    role = replace(kind.role, run=varying[0], unit="bytes", beside=beside)
+    return replace(field, type=replace(kind, role=role))
 
 
 def of_choice(name: str) -> tuple[str, str]:
     """Error and fix for a count of a choice."""
     hint = "put a number into each case, as {size: {type: u8, const: 4}, value: u32}"
     return f"{name} is a choice, whose size follows from its case", hint
+
+
+def scale_fault(count: Count, target: Field, unit: str, beside: int) -> tuple[str, str] | None:
+    """Error and fix for the scale or offset of a count, None if it tells every size of what it counts."""
+    kind, scale, offset = target.type, count.scale, count.offset
+    assert isinstance(kind, Blob | Array | Records)
+    if (scale, offset) == (1, 0):
+        return None
+    if target.walked and unit == "bytes":
+        what = f"the bytes of {target.name}, whose records vary in size, are counted one by one"
+        return what, "remove scale and offset"
+    least = kind.length.minimum if unit == "items" else kind.size_of(kind.length.minimum)
+    if least + beside < offset:
+        what = f"the count of {least + beside} {unit} of {target.name} would be negative"
+        return what, f"let {target.name} have more items, or use a smaller offset"
+    step = kind.size_of(1) if unit == "bytes" else 1
+    if scale > 1 and (step % scale or (beside - offset) % scale or (isinstance(kind, Array) and kind.packed)):
+        what = f"the {unit} that are counted are not always a multiple of {scale}"
+        return what, f"count an array whose items have {scale} bytes, or remove scale"
+    return None
 
 
 def _fault(

@@ -10,7 +10,7 @@ from qlinkgen.model.fields import Field, FieldType, Record, Records, greatest_si
 from qlinkgen.model.types import Array, Blob, Count, Scalar
 from qlinkgen.schema.conditions import ConditionBuilder
 from qlinkgen.schema.counted import with_counts
-from qlinkgen.schema.counting import of_choice, with_beside
+from qlinkgen.schema.counting import of_choice, scale_fault, with_beside
 from qlinkgen.schema.file_fields import Fields, FieldSpec, RecordSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.filled import FilledBuilder
@@ -164,9 +164,15 @@ class FieldBuilder:
         unit = "bytes" if isinstance(target.type, Blob) else count.unit
         most = target.type.length.maximum
         most = target.type.size_of(most) if unit == "bytes" else most
-        most += sum(each.max_size for each in fields if each.name in count.beside)
+        more = sum(each.max_size for each in fields if each.name in count.beside)
+        if fault := scale_fault(count, target, unit, more):
+            key = "offset" if count.offset else "scale"
+            self._report.error("bad-count", (*path[:-1], key), *fault, needs=needs)
+            self._report.taint(path)
+            return False
         if target.walked and unit == "bytes":
             return True  # an encoder refuses what it cannot count
+        most = (most + more - count.offset) // count.scale
         if most > scalar.maximum and (*path[:-2], target.name) not in self._types.unbounded:
             what = f"{field.name} counts up to {scalar.maximum}, but {target.name} has up to {most} {unit}"
             self._report.error(
@@ -277,7 +283,7 @@ class FieldBuilder:
         counter = counters.get(kind.length.counted_by)
         if counter and isinstance(counter.role, Count):
             beside = sum(each.max_size for each in fields if each.name in counter.role.beside)
-            limit = max(0, counter.maximum - beside)
+            limit = max(0, counter.maximum * counter.role.scale + counter.role.offset - beside)
             most = min(most, kind.items_in(limit) if counter.role.unit == "bytes" else limit)
         if most == 0:
             what = f"the payload has no room for {field.name}"

@@ -165,7 +165,7 @@ class ScalarBuilder:
                     "bad-width", "type", f"{base} has {plain.bits} bits", f"use 1 to {MAX_BITS} in groups"
                 )
         if spec.counts is not None:
-            return replace(scalar, role=Count(spec.counts[0], _count_unit(spec), tuple(spec.counts[1:])))
+            return replace(scalar, role=_count(spec, location))
         if is_filled(spec):
             return _placed(scalar, spec, plain, location)
         scalar = quantified(scalar, spec, plain.what, location)
@@ -260,6 +260,18 @@ def _covered(parts: tuple[tuple[int, int], ...], bits: int) -> bool:
     return sorted(bit for first, last in parts for bit in range(first, last + 1)) == list(range(bits))
 
 
+def _count(spec: FieldSpec, location: Location) -> Count:
+    """The role of a count."""
+    assert spec.counts is not None
+    role = Count(spec.counts[0], _count_unit(spec), tuple(spec.counts[1:]))
+    scale, offset = spec.scale or Fraction(1), spec.offset or Fraction(0)
+    if scale.denominator != 1 or scale < 1 or offset.denominator != 1:
+        key = "scale" if scale.denominator != 1 or scale < 1 else "offset"
+        location.fault("bad-count", key, f"the {key} of a count is not a whole number", "use one, like 4")
+        return role
+    return replace(role, scale=int(scale), offset=int(offset))
+
+
 def _count_unit(spec: FieldSpec) -> Literal["items", "bytes"]:
     """A count of several fields counts bytes."""
     return spec.counts_in if len(spec.counts or ()) == 1 else "bytes"
@@ -269,8 +281,6 @@ def _check_keys(spec: FieldSpec, plain: Plain, location: Location) -> None:
     """Report contradictory keys."""
     if spec.counts is not None:
         keys = (
-            "scale",
-            "offset",
             "range",
             "raw_range",
             "default",

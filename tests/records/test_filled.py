@@ -73,6 +73,15 @@ def test_the_other_value_of_a_constant_is_accepted() -> None:
     assert unpack(payload, bytes.fromhex("0007 01")) == unpack(payload, bytes.fromhex("012C 01"))
 
 
+def test_a_count_sends_the_number_less_its_offset() -> None:
+    fields = '{n: {type: u8, counts: run, offset: 1}, inverse: {type: u8, equals: ~n}, run: "u8[1..256]"}'
+    payload = plan_of(protocol_of(fields)).message("put.request").payload
+    assert pack(payload, {"run": [7] * 256}) == bytes.fromhex("FF 00") + bytes([7] * 256)
+    assert unpack(payload, bytes.fromhex("00 FF 05")) == {"run": [5]}
+    with pytest.raises(BadContent, match="length"):
+        unpack(payload, bytes.fromhex("01 FE 05"))
+
+
 def test_a_place_that_depends_on_values_is_refused() -> None:
     fields = '{flag: bool, list: {type: "u8[3]", if: flag}, sum: {type: u8, algorithm: sum8, over: [list]}}'
     (fault,) = faults_of(fields)

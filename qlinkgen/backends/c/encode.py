@@ -10,7 +10,7 @@ from qlinkgen.backends.c import checks, filled
 from qlinkgen.backends.c.layout import Layouts, pointer
 from qlinkgen.backends.c.members import count_of, member_of
 from qlinkgen.backends.c.names import count_type, unsigned, unsigned_type
-from qlinkgen.backends.c.sizes import index_of, local, local_size, size_text, term_text
+from qlinkgen.backends.c.sizes import index_of, local, local_size, plus, size_text, term_text
 from qlinkgen.model.integer import BitOrder, Integer, packed_size
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.expr import Within
@@ -139,7 +139,7 @@ class Encoder:
                     f"({local(step.run)} * {step.term.factor}U)" if step.term.factor > 1 else local(step.run)
                 )
                 number = f"((({number}) + 7U) / 8U)" if step.term.packed else number
-                number = f"({number} + {step.term.more}U)" if step.term.more else number
+                number = plus(number, step.term.more)
                 self._put(step.place, step.integer, f"({unsigned_type(step.integer.bits)}){number}")
             case FilledStep():
                 self._put(step.place, step.integer, filled.right(step, self.layouts, local_size))

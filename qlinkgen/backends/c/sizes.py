@@ -36,13 +36,18 @@ def term_text(term: Term, number: str) -> str:
     """The size of a run of so many items."""
     product = f"({term.factor}U * {number})" if term.factor > 1 else number
     product = f"(({product} + 7U) / 8U)" if term.packed else product
-    return f"({product} + {term.more}U)" if term.more else product
+    return plus(product, term.more)
+
+
+def plus(number: str, more: int) -> str:
+    """A number plus a constant."""
+    return f"({number} {'+' if more > 0 else '-'} {abs(more)}U)" if more else number
 
 
 def _items_text(term: Term, size: str) -> str:
     """The number of items of a row in so many bytes."""
     times, by = term.per_byte
-    size = f"({size} - {term.more}U)" if term.more else size
+    size = plus(size, -term.more)
     number = f"(size_t){grouped(size)}"
     number = f"({number} * {times}U)" if times > 1 else number
     return f"{number} / {by}U" if by > 1 else number
@@ -102,13 +107,12 @@ class Learner:
         """Assign the number of items of the run and check it; ``kind`` declares it."""
         integer, wide, more = count.integer, count.integer.bits > 16, count.term.more
         held, bounds = Within(0, integer.mask), count.bounds  # negative numbers are outside of them
-        early = wide or count.term.packed or more > 0  # may exceed a size_t, or be less than the bytes beside
+        early = (
+            wide or count.term.packed or more != 0
+        )  # may exceed a size_t, or be less than the bytes beside
         if early:
             self.refuse(broken([bounds], number, held, integer.bits), "LENGTH")
-        if count.term.packed:
-            number = _items_text(count.term, number)
-        else:
-            number = f"({number} - {more}U)" if more else number
+        number = _items_text(count.term, number) if count.term.packed else plus(number, -more)
         if not count.term.packed and count.scale > 1:
             self.refuse([f"({number} % {count.scale}U) != 0U"], "LENGTH")
             number, held = f"{number} / {count.scale}U", Within(0, integer.mask // count.scale)

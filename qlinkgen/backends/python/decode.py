@@ -481,7 +481,7 @@ class Decoder:
             items = f"len({_items_of(self._tabled)})"
             factor = step.term.factor
             expected = f"{factor} * {items}" if factor > 1 else items
-            expected = f"{expected} + {step.term.more}" if step.term.more else expected
+            expected = integers.plus(expected, step.term.more)
             self._sizes += [f"if {number} != {expected}:", self._bad_layout]
         elif (taken := integers.get(step.integer, local, self.place.byteorder)).stray:
             self._get(step.integer, local, at)

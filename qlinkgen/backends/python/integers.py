@@ -227,7 +227,12 @@ def term_text(term: Term) -> str:
     count = f"{term.run}_count"
     product = f"{term.factor} * {count}" if term.factor > 1 else count
     product = f"({product} + 7) // 8" if term.packed else product
-    return f"{product} + {term.more}" if term.more else product
+    return plus(product, term.more)
+
+
+def plus(number: str, more: int) -> str:
+    """A number plus a constant."""
+    return f"{number} {'+' if more > 0 else '-'} {abs(more)}" if more else number
 
 
 def count_text(step: CountStep) -> str:
@@ -240,7 +245,7 @@ def count_text(step: CountStep) -> str:
 def own_bytes(term: Term, number: str) -> str:
     """What a count says without the bytes that it counts beside the run."""
     number = f"({number})" if term.more and " | " in number else number
-    return f"{number} - {term.more}" if term.more else number
+    return plus(number, -term.more)
 
 
 def items_text(term: Term, size: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -274,6 +275,7 @@ class FieldMaker:
             self._fill_words(made, taken)
         if not fixed and not room.least and self.rng.random() < self.conditional:
             self._add_conditions(made, set(begun or {}), taken)
+        self._offset_counts(made)
         self._count_several(made)
         self._name_sizes(made)
         dated = self._dated(made, taken)
@@ -418,7 +420,7 @@ class FieldMaker:
         """Count the bytes of other fields too, where a count of bytes has room for them."""
         rng, specs = self.rng, dict(made)
         for at, (name, spec) in enumerate(made):
-            counting = isinstance(spec, dict) and spec.get("counts_in") == "bytes"
+            counting = isinstance(spec, dict) and spec.get("counts_in") == "bytes" and "scale" not in spec
             if not counting or spec["type"] != "u16" or rng.random() < 0.3:
                 continue
             always = [
@@ -430,6 +432,32 @@ class FieldMaker:
             made[at] = (name, {**spec, "counts": several})
             if chosen:
                 del made[at][1]["counts_in"]
+
+    def _offset_counts(self, made: list[tuple[str, Any]]) -> None:
+        """Let some counts be less than the number of items or bytes that they tell, or more."""
+        specs = dict(made)
+        for at, (name, spec) in enumerate(made):
+            counted = spec.get("counts") if isinstance(spec, dict) else None
+            run = specs.get(counted) if isinstance(counted, str) else None
+            bounds = re.search(r"\[(\d+)\.\.\d+\]", str(run))
+            if run is None or bounds is None or self._is_varied(run) or self.rng.random() < 0.8:
+                continue
+            base = str(run["type"] if isinstance(run, dict) else run).partition("[")[0]
+            least = int(bounds[1])
+            if (
+                spec.get("counts_in") == "bytes"
+                and re.fullmatch("[ui](16|24|32|64)", base)
+                and self.rng.random() < 0.7
+            ):
+                step = int(base[1:]) // 8
+                scale = self.rng.choice((step, 2 if step % 2 == 0 else step))
+                if not isinstance(run, dict) or not {"packed", "as", "groups"} & run.keys():
+                    made[at] = (
+                        name,
+                        {**spec, "scale": scale} | ({"offset": -2 * scale} if step == 2 else {}),
+                    )
+            else:
+                made[at] = (name, {**spec, "offset": self.rng.choice((-1, -2, min(1, least), least))})
 
     @staticmethod
     def _is_always(spec: Any) -> bool:

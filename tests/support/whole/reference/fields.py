@@ -114,7 +114,7 @@ class Fields:
         if not isinstance(counted, list):
             return slot
         (run,) = (each.name for each in slots if each.name in counted and not each.fixed)
-        more = sum(each.most_bytes for each in slots if each.name in counted and each.name != run)
+        more = slot.more + sum(each.most_bytes for each in slots if each.name in counted and each.name != run)
         unit = slot.counts_in if len(counted) == 1 else "bytes"
         return replace(slot, counts=run, counts_in=unit, more=more)
 
@@ -220,7 +220,9 @@ class Fields:
             members = tuple(self._member(*each) for each in spec["bits"].items())
             return Slot(name, Packed(number.pieces, number.bits, members))
         if "counts" in spec:
-            return Slot(name, number, "count", str(spec["counts"]), spec.get("counts_in", "items"))
+            more, scale = -int(spec.get("offset", 0)), int(spec.get("scale", 1))
+            unit = spec.get("counts_in", "items")
+            return Slot(name, number, "count", str(spec["counts"]), unit, more=more, scale=scale)
         if "algorithm" in spec:
             return Slot(name, number, "filled", rule=spec, over=tuple(spec["over"]))
         if "equals" in spec:
@@ -365,7 +367,7 @@ def _bounded(slot: Slot, room: int, counter: Slot | None) -> Slot:
     most = kind.items_in(max(0, room))
     if counter is not None:
         assert isinstance(counter.kind, Number)
-        limit = counter.kind.high - counter.more
+        limit = counter.kind.high * counter.scale - counter.more
         most = min(most, kind.items_in(limit) if counter.counts_in == "bytes" else limit)
     return replace(slot, kind=replace(kind, high=max(1, most)))
 

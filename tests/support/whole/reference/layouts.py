@@ -190,8 +190,9 @@ class Slot:
     over: tuple[str, ...] = ()
     #: Constants that are legal besides the one that is sent.
     accepted: tuple[int, ...] = ()
-    #: Bytes of other fields that it counts as well.
+    #: Bytes of other fields that it counts as well, less its offset, and bytes or items of one step.
     more: int = 0
+    scale: int = 1
     #: Tests of earlier values: name, ranges, whether they are excluded.
     when: tuple[Test, ...] = ()
     optional: bool = False

@@ -212,9 +212,10 @@ def _told(slot: Slot, number: Number, counted: Kind, given: Raw) -> int:
     told = counted.bytes_of(len(given)) if slot.counts_in == "bytes" else len(given)
     if isinstance(counted, Records) and slot.counts_in == "bytes" and not counted.record.constant:
         told = len(_encoded_records(counted, given))
-    if told + slot.more >= 1 << number.bits - number.signed:
+    told = (told + slot.more) // slot.scale
+    if told >= 1 << number.bits - number.signed:
         raise Wrong("range", "a count")
-    return told + slot.more
+    return told
 
 
 def meets(kind: Records, values: Mapping[str, Raw]) -> bool:
@@ -569,7 +570,7 @@ def _note(slots: Sequence[Slot], slot: Slot, data: bytes, counted: dict[str, int
     raw = get(slot.kind.pieces, data)
     run = next(each.kind for each in slots if each.name == slot.counts)
     if isinstance(run, Run) and run.packed and slot.counts_in == "bytes" and slot.counts in counted:
-        if raw != run.bytes_of(counted[slot.counts]) + slot.more:
+        if raw * slot.scale != run.bytes_of(counted[slot.counts]) + slot.more:
             raise Wrong("length", "counts differ")
         return
     items = items_of(slots, slot, raw)
@@ -581,7 +582,7 @@ def items_of(slots: Sequence[Slot], slot: Slot, raw: int) -> int:
     """The number of items from a count. Raises Wrong if it is illegal for the field."""
     kind = next(each.kind for each in slots if each.name == slot.counts)
     assert isinstance(kind, Run | Records)
-    raw -= slot.more
+    raw = raw * slot.scale - slot.more
     if kind.packed and slot.counts_in == "bytes":
         if not kind.low <= kind.items_in(raw) <= kind.most:
             raise Wrong("length", f"count {raw}")
