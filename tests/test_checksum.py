@@ -264,6 +264,7 @@ KNOWN = {
     "sum8-carry": 0xDE,
     "sum8-carry-inverted": 0x21,
     "xor8": 0x31,
+    "xor16": 0x0839,
     "sum16": 0x01DD,
     "sum16-inverted": 0xFE22,
     "sum16-zero": 0xFE23,

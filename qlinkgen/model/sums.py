@@ -94,10 +94,11 @@ class Sum(_Register):
 
 @dataclass(frozen=True, slots=True)
 class Xor(_Register):
-    """The exclusive or of the bytes.
+    """The exclusive or of the bytes, or of pairs of bytes: the last byte is the lower one of a pair.
 
     Attributes:
         name: name in schema files.
+        width: bits of the value.
         init: start of the value.
         aliases: other names in use.
     """
@@ -111,6 +112,8 @@ class Xor(_Register):
 
     def step(self, register: int, byte: int) -> int:
         """Return the register after one more byte."""
+        if self.width == 16:
+            register = (register << 8 | register >> 8) & self.mask
         return register ^ byte
 
 
@@ -157,6 +160,7 @@ SUMS: tuple[Sum | Xor | Fletcher, ...] = (
     Sum("sum16-zero", 16, "zero"),
     Sum("sum32", 32),
     Xor("xor8", aliases=("xor",)),
+    Xor("xor16", 16),
     Fletcher("fletcher-8", 16, 256),
     Fletcher("fletcher-16", 16, 255),
     Fletcher("adler-32", 32, 65521, init=1, aliases=("adler",)),

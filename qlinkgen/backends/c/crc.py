@@ -110,7 +110,7 @@ def _render(key: str, algorithm: Checksum, macros: str) -> CheckView:
         case Sum():
             return _render_sum(key, algorithm, _sum_step(algorithm), finished(algorithm))
         case Xor():
-            return _render_sum(key, algorithm, ["return (uint8_t)(sum ^ byte);"], "sum")
+            return _render_sum(key, algorithm, [_xor_step(algorithm)], "sum")
         case Fletcher():
             return _render_sum(key, algorithm, _fletcher_step(algorithm), "sum")
         case Algorithm():
@@ -145,6 +145,12 @@ def _sum_step(algorithm: Sum) -> list[str]:
             "return (uint8_t)((total & 0xFFU) + (total >> 8));",
         ]
     return [f"return ({unsigned_type(algorithm.width)})(sum + byte);"]
+
+
+def _xor_step(algorithm: Xor) -> str:
+    if algorithm.width == 16:
+        return "return (uint16_t)((uint16_t)((uint16_t)(sum << 8) | (sum >> 8)) ^ byte);"
+    return "return (uint8_t)(sum ^ byte);"
 
 
 def _fletcher_step(algorithm: Fletcher) -> list[str]:

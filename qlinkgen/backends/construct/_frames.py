@@ -87,15 +87,17 @@ class Sum(NamedTuple):
 
 
 class Xor(NamedTuple):
-    """The exclusive or of bytes."""
+    """The exclusive or of bytes, or of pairs of them."""
 
     init: int = 0
+    width: int = 8
 
     def compute(self, data: Iterable[int]) -> int:
         """The check value of bytes."""
         total = self.init
         for byte in data:
-            total ^= byte
+            turned = (total << 8 | total >> 8) & 0xFFFF if self.width == 16 else total
+            total = turned ^ byte
         return total
 
 

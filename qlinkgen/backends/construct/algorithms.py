@@ -17,7 +17,8 @@ def algorithm(algorithm: catalogue.Checksum) -> Call:
             carry = (("carry", True),) if algorithm.carry else ()
             return Call("Sum", (algorithm.width, *form), (*init, *carry))
         case catalogue.Xor():
-            return Call("Xor", (), init)
+            width = (("width", 16),) if algorithm.width == 16 else ()
+            return Call("Xor", (), (*init, *width))
         case catalogue.Fletcher():
             return Call("Fletcher", (algorithm.half, algorithm.modulus), init)
         case catalogue.Algorithm():

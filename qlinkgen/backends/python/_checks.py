@@ -299,9 +299,15 @@ def _folded(total: int) -> int:
     return (total - 1) % 0xFF + 1 if total else 0
 
 
-def xor_of(name: str, *, init: int = 0) -> Checksum:
-    """The exclusive or of the bytes."""
-    return Checksum(name, _xor, init)
+def xor_of(name: str, width: int = 8, *, init: int = 0) -> Checksum:
+    """The exclusive or of the bytes, or of pairs of them."""
+    return Checksum(name, _xor if width == 8 else _xor_pairs, init)
+
+
+def _xor_pairs(data: bytes, register: int) -> int:
+    for byte in data:
+        register = (register << 8 & 0xFF00 | register >> 8) ^ byte
+    return register
 
 
 def _xor(data: bytes, register: int) -> int:

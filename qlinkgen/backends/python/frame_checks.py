@@ -35,7 +35,7 @@ def maker_of(algorithm: Checksum) -> tuple[str, list[str]]:
                 return "carried", [name, *form, *init]
             return "sum_of", [name, str(algorithm.width), *form, *init]
         case Xor():
-            return "xor_of", [name, *init]
+            return "xor_of", [name, *(["16"] if algorithm.width == 16 else []), *init]
         case Fletcher(width=32, modulus=65521):
             return "adler", [name, *([] if algorithm.init == 1 else [f"init={algorithm.init}"])]
         case Fletcher():

@@ -23,7 +23,7 @@ def catalogue() -> Mapping[str, Mapping[str, str]]:
 _SUMS = {
     "sum8": 8, "sum8-inverted": 8, "sum8-zero": 8, "xor8": 8,
     "sum8-carry": 8, "sum8-carry-inverted": 8,
-    "sum16": 16, "sum16-inverted": 16, "sum16-zero": 16, "sum32": 32,
+    "xor16": 16, "sum16": 16, "sum16-inverted": 16, "sum16-zero": 16, "sum32": 32,
     "fletcher-8": 16, "fletcher-16": 16, "adler-32": 32,
 }  # fmt: skip
 _MODULUS = {"fletcher-8": 256, "fletcher-16": 255, "adler-32": 65521}
@@ -58,6 +58,12 @@ def compute(algorithm: Algorithm, data: Sequence[int], init: int | None = None) 
     if algorithm == "xor8":
         every = [*data, init or 0]
         return sum((sum(byte >> bit & 1 for byte in every) & 1) << bit for bit in range(8))
+    if algorithm == "xor16":
+        # The start is a pair before the others; a single first byte is the lower one of a pair.
+        start = (init or 0).to_bytes(2, "big")
+        every = [*start, *data] if len(data) % 2 == 0 else [start[1], start[0], 0, *data]
+        pairs = [every[at] << 8 | every[at + 1] for at in range(0, len(every), 2)]
+        return functools.reduce(lambda one, other: one ^ other, pairs)
     if algorithm in _MODULUS:
         first = int(algorithm == "adler-32") if init is None else init
         return _two_sums(list(data), first, _MODULUS[algorithm], width(algorithm) // 2)
