@@ -51,6 +51,7 @@ PEERS: Mapping[str, tuple[str, str]] = {
     "ubx": ("pyubx2", "pyubx2"),
     "visca": ("pyvisca", "pyvisca"),
     "vesc": ("pyvesc", "pyvesc"),
+    "xbee": ("digi", "digi-xbee"),
 }
 NAMES = library()
 
