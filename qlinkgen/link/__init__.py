@@ -13,6 +13,7 @@ from qlinkgen.link.events import Event
 from qlinkgen.link.health import HealthPolicy
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.monitor import Monitor
+from qlinkgen.link.peer import PeerEngine
 from qlinkgen.link.procedure import Ask, Pause, Procedure, Tell
 from qlinkgen.link.slave import PENDING, Node, Refusal, SlaveEngine
 from qlinkgen.link.timing import Timing
@@ -30,6 +31,7 @@ __all__ = [
     "Monitor",
     "Node",
     "Pause",
+    "PeerEngine",
     "Procedure",
     "Refusal",
     "Reply",

@@ -29,9 +29,11 @@ def answer_to(codec: Codec) -> AnswerTo | None:
 class AskedDecoder:
     """The receiver of a master whose answers only their request tells apart."""
 
-    def __init__(self, codec: Codec, answers: AnswerTo, asked: Callable[[Framed], Framed | None]) -> None:
+    def __init__(
+        self, codec: Codec, decoder: Decoder, answers: AnswerTo, asked: Callable[[Framed], Framed | None]
+    ) -> None:
         """``asked`` returns the request that a message may answer, None without one."""
-        self._decoder: Decoder = codec.StreamDecoder("response")
+        self._decoder = decoder
         self._answers = answers
         self._asked = asked
         self._error = codec.DecodeError

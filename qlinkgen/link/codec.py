@@ -74,6 +74,7 @@ class Fault(Protocol):
 class Bus(Protocol):
     """The line and its nodes; None for a missing address, or a speed that the document does not state."""
 
+    kind: str
     first_node: int | None
     last_node: int | None
     broadcast: int | None

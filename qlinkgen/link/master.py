@@ -26,6 +26,7 @@ from qlinkgen.link.asked import AskedDecoder, NotAnAnswer, answer_to
 from qlinkgen.link.attempts import Attempts
 from qlinkgen.link.codec import (
     Codec,
+    Decoder,
     Fault,
     Framed,
     OtherReply,
@@ -89,6 +90,7 @@ class MasterEngine:
             microsecond.
         counters: counts for each node, and under None those without a node.
         health: state of each node.
+        numbering: the counter of its frames, None without one.
     """
 
     def __init__(
@@ -99,7 +101,9 @@ class MasterEngine:
         echo: EchoMode = "none",
         health: HealthPolicy | None = None,
         accepts: Mapping[str, Accepts] | None = None,
+        decoder: Decoder | None = None,
     ) -> None:
+        """Make the master of a bus; a `PeerEngine` gives it a decoder."""
         hooks = accepts or {}
         self.codec = codec
         self.timing = timing
@@ -112,12 +116,11 @@ class MasterEngine:
             command.request: CommandTiming(command, timing, hooks.get(name))
             for name, command in codec.COMMANDS.items()
         }
-        answers = answer_to(codec)
-        self._decoder = (
-            codec.StreamDecoder("response") if answers is None else AskedDecoder(codec, answers, self._asked)
-        )
+        answers, self._decoder = answer_to(codec), decoder or codec.StreamDecoder("response")
+        if answers is not None:
+            self._decoder = AskedDecoder(codec, self._decoder, answers, self._asked)
         self._address = address_getter(codec)
-        self._numbering = numbering_of(codec)
+        self.numbering = numbering_of(codec)
         self._byte_time = timing.byte_time
         self._paced = timing.paced
         self._echo = EchoCanceller(echo)
@@ -148,6 +151,11 @@ class MasterEngine:
     def busy(self) -> bool:
         """A transaction is in progress."""
         return self._state is not IDLE
+
+    @property
+    def line(self) -> QuietLine:
+        """What it knows about the line."""
+        return self._line
 
     @property
     def total(self) -> LinkCounters:
@@ -184,8 +192,8 @@ class MasterEngine:
         if type(request) is Packet or (command := self._commands.get(type(request))) is None:
             raise TypeError(f"{type(request).__name__} is not a request of this protocol")
         tries = command.tries if attempts is None else self._tries_of(command, attempts)
-        if self._numbering is not None:
-            self._numbering.number(request)
+        if self.numbering is not None:
+            self.numbering.number(request)
         frame = self.codec.encode(request)
         node = self._address(request)
         dialogue = self._begun(command, request, further, node) if command.step_times or further else None
@@ -323,8 +331,8 @@ class MasterEngine:
         self._end_frame(now)
         self._gap.due = None
         pending, attempts = self._pending, self._attempts
-        if attempts.number and self._numbering is not None and self._numbering.per_frame:
-            self._numbering.number(pending.request)
+        if attempts.number and self.numbering is not None and self.numbering.per_frame:
+            self.numbering.number(pending.request)
             pending.frame = self.codec.encode(pending.request)
         frame, count, command = pending.frame, pending.count, pending.command
         attempts.number = number = attempts.number + 1
@@ -362,8 +370,8 @@ class MasterEngine:
         dialogue, pending = self._dialogue, self._pending
         assert dialogue is not None
         message = dialogue.next()
-        if self._numbering is not None:
-            self._numbering.number(message)
+        if self.numbering is not None:
+            self.numbering.number(message)
         frame = self.codec.encode(message)
         if self._address(message) != pending.node:
             raise ValueError(f"{message.NAME} is for another node than {pending.request.NAME}")

@@ -138,7 +138,9 @@ class Monitor:
         self._responses = codec.StreamDecoder("response")
         #: Faults reported by one of the two decoders, by offset; it may be that of the wrong direction.
         self._suspected: dict[int, Fault] = {}
-        self._pending: _Pending | None = None
+        #: The last request, and before it on a link that of the other side, which asks too.
+        self._asking: list[_Pending] = []
+        self._askers = 2 if codec.BUS.kind == "link" else 1
         self._answer_to = answer_to(codec)
         self._gap = Gap(timing.silence)
 
@@ -164,25 +166,26 @@ class Monitor:
         """End the stream."""
         self._sort(self._requests.finish(), self._responses.finish(), now)
         self._gap.due = None
-        if self._pending is not None:
-            self._pending.deadline = min(self._pending.deadline, now)
-            self.handle_timer(now)
+        for pending in self._asking:
+            pending.deadline = min(pending.deadline, now)
+        self.handle_timer(now)
 
     def next_timer(self) -> float | None:
         """Return the deadline of the pending request, or the end of a silence; None without either."""
-        pending = self._pending
-        return self._gap.before(None if pending is None or pending.reported else pending.deadline)
+        return self._gap.before(
+            min((each.deadline for each in self._asking if not each.reported), default=None)
+        )
 
     def handle_timer(self, now: float) -> None:
         """End a frame after a silence that alone does; report a request that was not answered in time."""
         if self._gap.passed(now):
             self._sort(self._requests.finish(), self._responses.finish(), now)
-        pending = self._pending
-        if pending is not None and not pending.reported and now >= pending.deadline:
-            pending.reported = True
-            answers = pending.answers
-            if answers is None or not (answers.timed and answers.items):  # otherwise that was their end
-                self.heard.append(Unanswered(now, pending.sent))
+        for pending in reversed(self._asking):
+            if not pending.reported and now >= pending.deadline:
+                pending.reported = True
+                answers = pending.answers
+                if answers is None or not (answers.timed and answers.items):  # otherwise that was their end
+                    self.heard.append(Unanswered(now, pending.sent))
 
     def _sort(
         self, asking: Sequence[Framed | Fault], answering: Sequence[Framed | Fault], now: float
@@ -200,25 +203,32 @@ class Monitor:
                 self._message(request, response, now)
 
     def _node_asked(self, now: float) -> int | None:
-        pending = self._pending
-        waits = pending is not None and not pending.answered and now < pending.deadline
-        return address_of(pending.request) if pending is not None and waits else None
+        waiting = (each for each in self._asking if not each.answered and now < each.deadline)
+        pending = next(waiting, None)
+        return None if pending is None else address_of(pending.request)
 
     def _message(self, request: Framed | None, response: Framed | None, now: float) -> None:
         # Both events are of the same frame, decoded or refused in each direction.
-        pending = self._pending
-        if response is not None and pending is not None and self._answer_to is not None:
-            with contextlib.suppress(self._codec.DecodeError):  # then it answers something else
-                response = self._answer_to(pending.request, response)
-        if response is not None and pending is not None and self._fits(pending, response):
-            in_time = not pending.answered and now < pending.deadline
-            if in_time or request is None:
-                self._replied(pending, response, now, late=not in_time)
+        if response is not None:
+            fitting = [pair for each in self._asking if (pair := self._answer(each, response))]
+            for pending, answer in fitting:
+                if not pending.answered and now < pending.deadline:
+                    self._replied(pending, answer, now, late=False)
+                    return
+            if fitting and request is None:
+                self._replied(*fitting[0], now, late=True)
                 return
         if request is not None:
             self._asked(request, now)
         elif response is not None:
             self.heard.append(Stray(now, response, late=False))
+
+    def _answer(self, pending: _Pending, response: Framed) -> tuple[_Pending, Framed] | None:
+        """The answer to a request in a frame, None if it answers something else."""
+        if self._answer_to is not None:
+            with contextlib.suppress(self._codec.DecodeError):
+                response = self._answer_to(pending.request, response)
+        return (pending, response) if self._fits(pending, response) else None
 
     def _fits(self, pending: _Pending, response: Framed) -> bool:
         if pending.due(response):
@@ -287,23 +297,28 @@ class Monitor:
         if command is None:  # a message outside commands: sent by any node, without a response
             self.heard.append(Stray(now, request, late=False))
             return
-        before = self._pending
-        if before is not None and not before.reported:  # the master did not wait for the deadline
-            self.heard.append(Unanswered(now, before.sent))
+        before = next((each for each in self._asking if each.request == request), None)
+        if before is None and len(self._asking) == self._askers:
+            before = self._asking[-1]
+        if before is not None:
+            self._asking.remove(before)
+            if not before.reported:  # the master did not wait for the deadline
+                self.heard.append(Unanswered(now, before.sent))
         repeat = before is not None and not before.answered and before.request == request
         unanswerable = not addresses_that_answer(command, request, self._codec.BUS)
-        self._pending = _Pending(command, request, now, now + self._timing.deadline(command, 0))
+        pending = _Pending(command, request, now, now + self._timing.deadline(command, 0))
+        self._asking.insert(0, pending)
         if command.many is not None:
-            self._pending.deadline += self._timing.duration(command.many)
-        self._pending.answered = self._pending.reported = unanswerable
-        if self._pending.dialogue is not None:
-            self._pending.reported = self._pending.dialogue.sends
+            pending.deadline += self._timing.duration(command.many)
+        pending.answered = pending.reported = unanswerable
+        if pending.dialogue is not None:
+            pending.reported = pending.dialogue.sends
         self.heard.append(Asked(now, request, repeat, self._codec.encode(request)))
 
     def _continued(self, request: Framed, now: float) -> bool:
         """Note a later frame of a dialogue; return whether it is one."""
-        pending = self._pending
-        if pending is None or not pending.follows(request, now):
+        pending = next((each for each in self._asking if each.follows(request, now)), None)
+        if pending is None:
             return False
         dialogue = pending.dialogue
         assert dialogue is not None

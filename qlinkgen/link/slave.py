@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from typing import Any, Literal, Protocol
 
-from qlinkgen.link.codec import Codec, Fault, Framed, Message, address_of, is_message, wrong_size
+from qlinkgen.link.codec import (
+    Codec,
+    Decoder,
+    Fault,
+    Framed,
+    Message,
+    address_of,
+    is_message,
+    wrong_size,
+)
 from qlinkgen.link.echo import EchoCanceller
 from qlinkgen.link.gaps import Gap, silence_of
 from qlinkgen.link.numbering import numbering_of
@@ -72,6 +81,7 @@ class SlaveEngine:
     Attributes:
         node: the behaviour of the node.
         counters: counts of frames.
+        numbering: the counter of its frames, None without one.
     """
 
     def __init__(
@@ -83,6 +93,7 @@ class SlaveEngine:
         baud: int | None = None,
         echo: Literal["expect", "none"] = "none",
         host_slack: float = 0.0,
+        decoder: Decoder | None = None,
     ) -> None:
         """Make the engine of one node.
 
@@ -98,6 +109,7 @@ class SlaveEngine:
                 with an unexpected echo the node would answer itself endlessly.
             host_slack: largest delay with which bytes of one frame arrive; where only a silence ends a
                 frame, the node waits for it that much longer.
+            decoder: that of a `PeerEngine`; by default its own.
         """
         if echo not in ("expect", "none"):
             raise ValueError(
@@ -108,7 +120,7 @@ class SlaveEngine:
         self.node = node
         self.counters = SlaveCounters()
         self._encode = codec.encode
-        self._numbering = numbering_of(codec)
+        self.numbering = numbering_of(codec)
         self._broadcast = codec.BUS.broadcast
         self._addressed = codec.BUS.first_node is not None
         self._answering = {
@@ -121,7 +133,7 @@ class SlaveEngine:
             kind for each in self._dialogues.values() for who, kind, _ in each.steps if who == "send"
         }
         self._dialogue: SlaveDialogue | None = None
-        self._decoder = codec.StreamDecoder("request")
+        self._decoder = decoder or codec.StreamDecoder("request")
         self._turnaround = turnaround
         speed = baud or codec.BUS.baud
         self._byte_time = codec.BUS.bits_per_byte / speed if speed else 0.0
@@ -253,8 +265,8 @@ class SlaveEngine:
         self._answer = self._further.pop(0) if several else b""
 
     def _encoded(self, request: Framed, response: Message) -> bytes:
-        if self._numbering is not None:
-            self._numbering.answer(request, response)
+        if self.numbering is not None:
+            self.numbering.answer(request, response)
         return self._encode(response)
 
     def _check(self, request: Framed, response: Message) -> None:

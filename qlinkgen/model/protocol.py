@@ -48,6 +48,11 @@ class Protocol:
     #: The schema that it includes, relative to its own, "" for none.
     includes: str = ""
 
+    @property
+    def both_ask(self) -> bool:
+        """Whether both sides of a link send requests."""
+        return any(command.asker != "first" for command in self.commands)
+
     def without_texts(self) -> Protocol:
         """The protocol without free text, so that generated code contains only names and numbers.
 

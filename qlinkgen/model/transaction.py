@@ -18,6 +18,8 @@ Addressing = Literal["node", "broadcast", "either", "answered_broadcast", "none"
 #: "refused": the slave does not do it; "again": it asks for the request once more; "pending": the answer
 #: follows later; "done": an answer like the response, of another form.
 Means = Literal["refused", "again", "pending", "done"]
+#: Who sends the request of a command: the first side of a link or the master of a bus, the second, or both.
+Asker = Literal["first", "second", "either"]
 BusKind = Literal["master_slave", "link", "ring", "host"]
 
 
@@ -172,6 +174,8 @@ class Command:
     steps: tuple[Step, ...] = ()
     #: What the response means, None if it always answers the request.
     outcome: Reply | None = None
+    #: The side that sends the request.
+    asker: Asker = "first"
     #: Protocol-specific attributes; names and values are declared in the schema.
     attributes: Labels = field(default_factory=lambda: MappingProxyType({}))
 
@@ -245,3 +249,5 @@ class Bus:
     bits_per_byte: int
     response_within: Allowance
     section: Text = ""
+    #: Names of the sides of a link; () for others, and for a link that does not name them.
+    sides: tuple[str, ...] = ()

@@ -23,6 +23,7 @@ from qlinkgen.schema.notation import AnswerId, Duration, StatedId, shown
 from qlinkgen.schema.replies import ReplyBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.seeds import is_number
+from qlinkgen.schema.sides import asker_of, check_sides
 from qlinkgen.schema.sizes import sized
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.steps import Asked, StepBuilder, names_response
@@ -44,6 +45,7 @@ def build_bus(file: SchemaFile, report: Reporter) -> Bus:
         bits_per_byte=spec.bits_per_byte,
         response_within=_allowance(spec.response_within),
         section=spec.section,
+        sides=tuple(spec.sides or ()),
     )
 
 
@@ -90,6 +92,14 @@ class CommandBuilder:
             needs = (("commands",), ("messages",))
             self._report.error("empty-protocol", (), what, "add commands: or messages:", needs=needs)
         self._check_ids()
+        check_sides(
+            self._file,
+            self._frame,
+            self.commands,
+            self.messages,
+            places=self._build.id_places,
+            report=self._report,
+        )
         self._check_only()
 
     def _carry(self) -> None:
@@ -131,6 +141,7 @@ class CommandBuilder:
                 steps=steps,
                 outcome=self._replies.outcome(name, response),
                 in_flight=spec.in_flight or defaults.in_flight or 1,
+                asker=asker_of(self._file, name, self._report),
                 doc=spec.doc,
                 section=self._section(spec),
                 confirmed=spec.confirmed,

@@ -277,6 +277,9 @@ class DefaultsSpec(FileMapping):
     )
     repeat: Repeat | None = Field(default=None, description="Whether a request may be repeated")
     in_flight: Count | None = Field(default=None, description="Maximum number of outstanding requests")
+    side: Name | None = Field(
+        default=None, alias="from", description="The side of a link that asks, or either; default: the first"
+    )
     attributes: dict[str, Label] = Field(default_factory=dict, description="Values of declared attributes")
 
 
@@ -338,6 +341,9 @@ class CommandSpec(Fact, Lifetime):
     response_within: Time | None = Field(default=None, description="Overrides the time limit of the bus")
     repeat: Repeat | None = Field(default=None, description="Whether a request may be repeated")
     in_flight: Count | None = Field(default=None, description="Maximum number of outstanding requests")
+    side: Name | None = Field(
+        default=None, alias="from", description="The side of a link that asks, or either; default: the first"
+    )
     attributes: dict[str, Label] = Field(default_factory=dict, description="Values of declared attributes")
     examples: list[ExampleSpec] = Field(default_factory=list, description="Frames of the source document")
 

@@ -17,11 +17,12 @@ from qlinkgen.schema.file_base import Fact
 from qlinkgen.schema.file_commands import CommandSpec, MessageSpec
 from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.file_model import SchemaFile
-from qlinkgen.schema.notation import StatedId, shown
+from qlinkgen.schema.notation import StatedId
 from qlinkgen.schema.pieces import IdBuilder
-from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.seeds import SeedBuilder
 from qlinkgen.schema.separated import check_separator, separated
+from qlinkgen.schema.sides import check_side
 from qlinkgen.schema.source import Path
 
 _FRAME: Path = ("frame",)
@@ -243,17 +244,12 @@ class MessageBuilder:
         place: Path = ("messages", name, "from")
         if spec.side is None:
             return spec.direction or "message"
-        sides, needs = self._file.bus.sides or [], (place, ("bus",))
         if spec.direction is not None:
-            what = f"{name} has a side and a direction"
+            what, needs = f"{name} has a side and a direction", (place, ("bus",))
             self._report.error("bad-link", place, what, "remove one of them", of_key=True, needs=needs)
-        elif not sides:
-            what = f"{name} is from a side, but the bus has none"
-            hint = "write bus: {kind: link, sides: [host, device]}"
-            self._report.error("bad-link", place, what, hint, of_key=True, needs=needs)
-        elif spec.side not in sides:
-            what, hint = f"the bus has no side {shown(spec.side)}", f"its sides are {listed(sides)}"
-            self._report.error("bad-link", place, what, did_you_mean(spec.side, sides, hint), needs=needs)
+        else:
+            check_side(self._file, name, spec.side, place, self._report)
+        sides = self._file.bus.sides or []
         return "response" if spec.side in sides[1:] else "request"
 
     def _addresses(

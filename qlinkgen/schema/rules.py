@@ -154,9 +154,11 @@ _ALL = (
     ),
     Rule(
         "bad-link",
-        "Only a link has sides, which are two, and messages come from one of them.",
+        "Only a link has sides, which are two; messages and requests come from them.",
         "Neither side of a link is its master: each sends messages. The first of its `sides` also sends the "
-        "requests of commands, and the other one answers.",
+        "requests of commands, and the other one answers, unless `from` says otherwise. Where both ask, each "
+        "has a receiver for requests and one for answers, and tells them by their numbers; what one takes, "
+        "the other passes over, for which frames have an end and a check value of their own.",
     ),
     Rule(
         "part-direction",

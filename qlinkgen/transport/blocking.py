@@ -30,6 +30,7 @@ class BlockingMaster(MasterDriver):
     def __init__(self, engine: Asker, port: Port, *, on_event: Callable[[Event], None] | None = None) -> None:
         super().__init__(engine, port, on_event)
         self._lock = threading.RLock()  # reentrant, since on_event may send requests
+        self._queue = threading.Lock()  # of a peer, whose threads take turns
         self._asking: int | None = None  # the thread that holds it
         tell_of_forks(self)
 

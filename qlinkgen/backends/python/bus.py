@@ -19,7 +19,7 @@ from qlinkgen.backends.python.names import attribute, class_name, held, imported
 from qlinkgen.backends.python.place import Place, place_of
 from qlinkgen.backends.python.sections import templates
 from qlinkgen.model.fields import Value
-from qlinkgen.model.naming import file_stem, method
+from qlinkgen.model.naming import file_stem, method, pascal
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import Command, Reply, Unknown
@@ -33,6 +33,8 @@ __all__ = ["generate", "render"]
 #: selected. If it is unknown whether a command acts on an axis, selecting one is safe.
 _AXIS = "axis"
 _CHOSEN = ("current", "unknown")
+#: Who does not ask what the first and the second side of a link ask.
+_OTHERS = ("second", "first")
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,38 @@ class Caller:
         return (
             [line] if len(line) + 4 <= WIDTH else [f"{self.prefix}def ask(", f"    {arguments}", ") -> _R:"]
         )
+
+
+@dataclass(frozen=True)
+class Server:
+    """A class whose methods answer requests, and the table of these methods."""
+
+    name: str
+    what: str
+    table: str
+    rows: list[str]
+    methods: list[Method]
+
+
+@dataclass(frozen=True)
+class Side:
+    """Who asks: a master, or one side of a link whose sides both do."""
+
+    #: What the names of its classes begin with, for those that ask and those that answer.
+    asks: str
+    answers: str
+    asked: Sequence[Transaction]
+    answered: Sequence[Transaction]
+
+
+def sides_of(protocol: Protocol, calls: Sequence[Transaction]) -> list[Side]:
+    """The sides of a protocol that have classes of their own: the second one only if it asks for others."""
+    names = protocol.bus.sides
+    if all(call.command.asker == "either" for call in calls) or not protocol.both_ask or not names:
+        return [Side("Master", "Slave", calls, calls)]
+    by_first, by_second = ([call for call in calls if call.command.asker != other] for other in _OTHERS)
+    first, second = (pascal(name) for name in names)
+    return [Side(first, first, by_first, by_second), Side(second, second, by_second, by_first)]
 
 
 def generate(protocol: Protocol, options: Options) -> Outputs:
@@ -126,13 +160,12 @@ class BusView:
     """The variables of the template."""
 
     doc: Sequence[str]
-    table: Sequence[str]
     imports: Sequence[str]
     decimals: bool
     new: bool
     public: Sequence[str]
     callers: Sequence[Caller]
-    handlers: Sequence[Method]
+    servers: Sequence[Server]
     nodes: str
     others: bool
     many: bool
@@ -147,6 +180,7 @@ class BusModule:
         self._plan = plan
         self._protocol = plan.protocol
         self._transactions = transactions
+        self._sides = sides_of(plan.protocol, transactions)
         self._place: Place = place_of(plan)
         self._classes = {"Message"}
 
@@ -154,10 +188,12 @@ class BusModule:
         """The module's text."""
         host = self._protocol.bus.kind == "host"
         callers = self._callers(host=host) if self._plan.role != "slave" else []
-        handlers = self._handlers() if self._plan.role != "master" and not host else []
+        servers = self._servers() if self._plan.role != "master" and not host else []
         asker = "host" if host else "master"
-        parts = {f"calls of a {asker}": callers, "handlers of a slave": handlers}
-        title = " and ".join(title for title, part in parts.items() if part)
+        titles = f"calls of a {asker}", "handlers of a slave"
+        if len(self._sides) > 1:
+            titles = "calls of each side of a link", "its handlers"
+        title = " and ".join(title for title, part in zip(titles, (callers, servers), strict=True) if part)
         first, *others = banner(self._protocol)
         head = one_line(f"{first}: {title}, a method for each command.")
         source = f"from .{file_stem(self._protocol.name)} import "
@@ -166,15 +202,14 @@ class BusModule:
         lines = [line for other in others for line in textwrap.wrap(one_line(other), WIDTH)]
         view = BusView(
             doc=python_text.docstring([*textwrap.wrap(head, WIDTH - 4), "", *lines]),
-            table=[f'{self._class(t.request)}: "{t.name}"' for t in self._transactions],
             imports=[source + ", ".join(classes)]
             if fits
             else [f"{source}(", *(f"    {each}," for each in classes), ")"],
             decimals="Decimal" in self._place.used,
             new="NEW" in self._place.used,
-            public=sorted([*(each.name for each in callers), *(["SlaveHandlers"] if handlers else [])]),
+            public=sorted([*(each.name for each in callers), *(each.name for each in servers)]),
             callers=callers,
-            handlers=handlers,
+            servers=servers,
             nodes=f", {self._nodes()}" if self._nodes() else "",
             others=any(each.done for each in self._transactions),
             many=any(each.command.many for each in self._transactions),
@@ -259,16 +294,23 @@ class BusModule:
             if host:
                 found += self._host_callers(asynchronous=asynchronous)
                 continue
-            found.append(self._caller("MasterCalls", asynchronous=asynchronous, node=False))
-            if self._place.address:
-                found.append(self._caller("NodeCalls", asynchronous=asynchronous, node=True))
+            for side in (side for side in self._sides if side.asked):
+                found.append(self._caller(side, asynchronous=asynchronous, node=False))
+                if self._place.address:
+                    found.append(self._caller(side, asynchronous=asynchronous, node=True))
         return found
 
-    def _caller(self, name: str, *, asynchronous: bool, node: bool) -> Caller:
+    def _caller(self, side: Side, *, asynchronous: bool, node: bool) -> Caller:
         what = "calls to one node" if node else "calls of a master"
+        name = "NodeCalls" if node else f"{side.asks}Calls"
+        if len(self._sides) > 1:
+            what = (
+                f"calls of the {self._side(side)} to one node" if node else f"calls of the {self._side(side)}"
+            )
+            name = f"{side.asks}NodeCalls" if node else name
         more = ["", "Attributes:", f"    number: Address of the node, {self._nodes()}."] if node else []
         doc = _caller_doc(name, what, more, asynchronous=asynchronous)
-        asked = [each for each in self._transactions if not (node and each.command.addressing == "broadcast")]
+        asked = [each for each in side.asked if not (node and each.command.addressing == "broadcast")]
         methods = [self._method(each, asynchronous=asynchronous, node=node) for each in asked]
         return _make_caller(name, doc, methods, asynchronous=asynchronous, one=node)
 
@@ -385,8 +427,23 @@ class BusModule:
 
     # Slave
 
-    def _handlers(self) -> list[Method]:
-        return [self._handler(call) for call in self._transactions]
+    def _side(self, side: Side) -> str:
+        """The name of a side of a link."""
+        return self._protocol.bus.sides[self._sides.index(side)]
+
+    def _servers(self) -> list[Server]:
+        several = len(self._sides) > 1
+        return [
+            Server(
+                f"{side.answers}Handlers",
+                f"the {self._side(side)}" if several else "a slave",
+                f"_{self._side(side).upper()}_METHODS" if several else "_METHODS",
+                [f'{self._class(t.request)}: "{t.name}"' for t in side.answered],
+                [self._handler(call) for call in side.answered],
+            )
+            for side in self._sides
+            if side.answered
+        ]
 
     def _handler(self, call: Transaction) -> Method:
         command = call.command

@@ -103,7 +103,7 @@ class _Maker:
         else:
             document |= self._traffic(shape, maker, document["bus"])
         if shape.bus == "master_slave" and self.seed % _LINK == 1:
-            _link(document)
+            _link(rng, document)
         maker.forget_unused(document)
         return document
 
@@ -538,12 +538,27 @@ class _Maker:
                 return number
 
 
-def _link(document: Doc) -> None:
+def _link(rng: random.Random, document: Doc) -> None:
     """Let the bus be a link, whose sides the directed messages name."""
     document["bus"] |= {"kind": "link", "sides": ["host", "device"]}
     for spec in document.get("messages", {}).values():
         if "direction" in spec:
             spec["from"] = {"request": "host", "response": "device"}[spec.pop("direction")]
+    commands = document.get("commands", {}).values()
+    if _passed_over(document) and all(spec.get("response", "none") == "none" for spec in commands):
+        for spec in commands:
+            spec["from"] = rng.choice(("host", "device", "either"))
+
+
+def _passed_over(document: Doc) -> bool:
+    """Whether a receiver of one direction passes over the frames of the other, as both sides need to ask."""
+    parts = document.get("frame", {}).get("parts", {}).values()
+    specs = [spec for spec in parts if isinstance(spec, dict)]
+    ended = any("counts" in spec or spec.get("role") == "terminator" for spec in specs)
+    checks = [spec["over"] for spec in specs if "algorithm" in spec]
+    seeded = any(str(each).startswith("attribute.") for over in checks for each in over)
+    plain = "to_unknown" not in document and not any("if" in spec for spec in specs)
+    return ended and bool(checks) and not seeded and plain
 
 
 # YAML
