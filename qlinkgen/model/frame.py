@@ -421,6 +421,19 @@ class FrameKinds:
         """The address, None if no kind has one."""
         return next((each.frame.address for each in self.kinds if each.frame.address), None)
 
+    @property
+    def counter(self) -> PartBits | None:
+        """The counter among the values, None if no kind has one."""
+        return next((each.frame.counter for each in self.kinds if each.frame.counter), None)
+
+    @cached_property
+    def values(self) -> tuple[Value, ...]:
+        """Values of frames of any kind; those of several kinds have one name and one type."""
+        found: dict[str, Value] = {}
+        for each in self.kinds:
+            found = {**{value.name: value for value in each.frame.values}, **found}
+        return tuple(found.values())
+
 
 OneFrame = DelimitedFrame | MarkedFrame | PacketFrame
 Frame = OneFrame | FrameKinds

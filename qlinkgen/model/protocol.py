@@ -109,17 +109,19 @@ class Protocol:
     @property
     def frame_values(self) -> tuple[Value, ...]:
         """Values of every frame, beside those of its message."""
-        return self.frame.values if isinstance(self.frame, DelimitedFrame) else ()
+        return self.frame.values if isinstance(self.frame, DelimitedFrame | FrameKinds) else ()
 
     def beside(self, message: Message) -> tuple[Value, ...]:
         """Values of the frame of a message."""
-        frame = self.frame
+        frame: Frame = self.frame
+        if isinstance(frame, FrameKinds):
+            frame = frame.carrying(message.id)[0].frame
         return frame.towards(message.direction).values if isinstance(frame, DelimitedFrame) else ()
 
     @property
     def counter(self) -> PartBits | None:
         """The counter among the values of frames, None if there is none."""
-        return self.frame.counter if isinstance(self.frame, DelimitedFrame) else None
+        return self.frame.counter if isinstance(self.frame, DelimitedFrame | FrameKinds) else None
 
     @property
     def repeated(self) -> tuple[str, ...]:

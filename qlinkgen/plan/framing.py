@@ -104,6 +104,11 @@ class FramePlan:
         return self.kinds or (self,)
 
     @property
+    def values(self) -> Mapping[str, Member]:
+        """The values of frames of any kind, by name."""
+        return {member.name: member for each in self.every for _, member in each.envelope.values}
+
+    @property
     def search(self) -> Mapping[str, object]:
         """What one receiver needs to find the frames of both directions, by its name in error messages."""
         envelope, end, way = self.envelope, self.end, self.transparency
@@ -241,7 +246,9 @@ def _kinds(frame: FrameKinds, direction: Direction) -> FramePlan:
         end=ByKind(),
         transparency=Plain(),
         receiver=Rescan(
-            bare=False, verified=all(isinstance(each, Rescan) and each.verified for each in receivers)
+            bare=False,
+            verified=all(isinstance(each, Rescan) and each.verified for each in receivers),
+            seeded=any(each.envelope.seeded for each in kinds),
         ),
         address=next((each.address for each in kinds if each.address), ""),
         id_name=next((each.id_name for each in kinds if each.id_name), ""),

@@ -143,8 +143,7 @@ class Plan:
     @cached_property
     def beside(self) -> Mapping[str, Member]:
         """The values of frames of any direction, by name."""
-        frames = (*self.frames["request"].every, *self.frame.every)
-        return {member.name: member for frame in frames for _, member in frame.envelope.values}
+        return {**self.frames["request"].values, **self.frame.values}
 
     @cached_property
     def layouts(self) -> tuple[Layout, ...]:

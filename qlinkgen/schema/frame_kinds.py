@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 
-from qlinkgen.model.frame import ATTRIBUTE, DelimitedFrame, FrameKind, FrameKinds, Part
+from qlinkgen.model.frame import DelimitedFrame, FrameKind, FrameKinds, Part, PartBits
 from qlinkgen.model.message import Message
 from qlinkgen.schema.file_commands import AnswerSpec, StepMessageSpec
 from qlinkgen.schema.file_model import SchemaFile
@@ -68,6 +68,7 @@ def build_kinds(file: SchemaFile, builder: FrameBuilder, report: Reporter) -> Fr
         checker.kind(each)
     checker.starts(found)
     checker.addresses(found)
+    checker.values(found)
     for family in range(len(families)):
         checker.family([each for each in found if each.family == family])
     return kinds
@@ -84,6 +85,7 @@ def family_frame(kinds: FrameKinds, family: int) -> DelimitedFrame:
 def check_used(kinds: FrameKinds, messages: list[Message], report: Reporter) -> None:
     """Check that each kind carries a message, and which kinds only answers may have."""
     used = {each.name for message in messages for each in kinds.carrying(message.id)}
+    _check_repeated(kinds, messages, report)
     for kind in kinds.kinds:
         if kind.name not in used:
             what = f"no message has frame: {kind.name}"
@@ -106,6 +108,19 @@ def check_used(kinds: FrameKinds, messages: list[Message], report: Reporter) -> 
                 what = f"{message.name} is not an answer, and its frame of {counted} has no check value"
                 hint = "any byte of noise may be one; only a response or a reply has such a frame"
                 report.error("short-frame", ("frames", kind.name), what, hint, of_key=True)
+
+
+def _check_repeated(kinds: FrameKinds, messages: list[Message], report: Reporter) -> None:
+    """Check that requests have the counter that their answers repeat."""
+    requests = [each for each in messages if each.name == f"{each.command}.request"]
+    for answer in (each for each in messages if each.echoed):
+        own = [each for each in requests if each.command == answer.command]
+        for request in own or requests:
+            kind = kinds.carrying(request.id)[0]
+            if kind.frame.counter is None:
+                what = f"{answer.name} repeats {answer.echoed[0]}, which {request.name} does not have"
+                hint = f"add the counter to the frame {kind.name}, or remove echo"
+                report.error(_RULE, ("frames", kind.name), what, hint, of_key=True)
 
 
 class _Checker:
@@ -159,6 +174,27 @@ class _Checker:
                 what += f"that of {having[0][0].name} {first.name} of {first.bits}"
                 self._error(("frames", kind.name), what, "give both the same name and size")
 
+    def values(self, kinds: list[FrameKind]) -> None:
+        """Check that kinds have the same values under one name, and cover the same attributes."""
+        known: dict[str, tuple[FrameKind, PartBits]] = {}
+        for kind in kinds:
+            path: Path = ("frames", kind.name)
+            for bits in (each for part in kind.frame.parts for each in part.bits if each.type):
+                other, same = known.setdefault(bits.name, (kind, bits))
+                if (bits.type, bits.counting) != (same.type, same.counting):
+                    what = f"{bits.name} of {kind.name} is not {bits.name} of {other.name}"
+                    self._error(path, what, "give both the same type, range and default, or other names")
+        counters = {kind.frame.counter.name: kind.name for kind in kinds if kind.frame.counter is not None}
+        if len(counters) > 1:
+            (name, one), (second, another), *_ = counters.items()
+            what = f"{one} counts with {name}, {another} with {second}"
+            self._error(("frames", another), what, "give both the same name")
+        seeded = [kind for kind in kinds if kind.frame.attributes]
+        for kind in seeded[1:]:
+            if kind.frame.attributes != seeded[0].frame.attributes:
+                what = f"check values of {kind.name} and {seeded[0].name} cover different attributes"
+                self._error(("frames", kind.name), what, "let both cover the same, in the same order")
+
     def family(self, kinds: list[FrameKind]) -> None:
         """Check kinds that carry the same messages: only constants, lengths and check values differ."""
         first, *others = kinds
@@ -168,6 +204,10 @@ class _Checker:
                 hint = "let each message name its frame, or change only constants, lengths and check values"
                 self._error(("frames", kind.name), what, hint)
                 return
+            if bool(kind.frame.attributes) != bool(first.frame.attributes):
+                what = f"{kind.name} and {first.name} carry the same messages, but one covers an attribute"
+                hint = "let each message name its frame, or cover it in both"
+                self._error(("frames", kind.name), what, hint)
         for kind in kinds if others else ():
             repeated = {part.derivation.of for part in kind.frame.parts if part.derivation}
             if (length := kind.frame.part("length")) and length.name in repeated:
@@ -190,12 +230,8 @@ def _excess(part: Part) -> str:
         return "is a terminator"
     if part.trim is not None:
         return "is trimmed"
-    if any(bits.role == "value" for bits in part.bits):
-        return "holds a value of every frame"
     if part.checksum and part.checksum.every:
         return "has a value for each block"
-    if part.checksum and any(name.startswith(ATTRIBUTE) for name in part.checksum.over):
-        return "covers an attribute"
     if part.checksum and part.checksum.otherwise is not None:
         return "has a value for nothing"
     return ""

@@ -48,8 +48,8 @@ class KindMessages:
 
     @property
     def repeated(self) -> tuple[str, ...]:
-        """Values of the frame that answers repeat: kinds have no values."""
-        return ()
+        """Values of the frame that answers repeat."""
+        return next((each.repeated for each in self._builders.values() if each.repeated), ())
 
     @property
     def ways(self) -> PartBits | None:

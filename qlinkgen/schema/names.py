@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from qlinkgen.model import naming
 from qlinkgen.model.fields import Layout, Records, Value, layouts_of
-from qlinkgen.model.frame import DelimitedFrame, Frame
+from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import snake, upper
 from qlinkgen.model.types import Array, Blob, Scalar
@@ -164,7 +164,7 @@ def _beside(frame: Frame | None, address: str | None, path: Path) -> Iterator[tu
     """Attributes of a message for the address and the values of its frame."""
     if address is not None:
         yield naming.address_attribute(address), f"the frame's '{address}'", path
-    for value in frame.values if isinstance(frame, DelimitedFrame) else ():
+    for value in frame.values if isinstance(frame, DelimitedFrame | FrameKinds) else ():
         yield naming.attribute(value.name), f"the frame's '{value.name}'", path
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from qlinkgen.model.frame import DelimitedFrame, Frame, PacketFrame
+from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds, PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Addressing, Allowance, Case, Reply
 from qlinkgen.model.types import Enum, Float, Scalar
@@ -240,7 +240,9 @@ class ReplyBuilder:
                 yield Case(first, last, means, name)
 
     def _switch(self, name: str, message: Message, path: Path) -> Scalar | None:
-        every = self._frame.towards("response").values if isinstance(self._frame, DelimitedFrame) else ()
+        frame = self._frame
+        frame = frame.carrying(message.id)[0].frame if isinstance(frame, FrameKinds) else frame
+        every = frame.towards("response").values if isinstance(frame, DelimitedFrame) else ()
         known = {value.name: value.type for value in (*every, *message.values) if not value.field.conditional}
         place, needs = (*path, "switch"), ((*path, "switch"), (*path[:-1], "fields"), ("frame",))
         kind = known.get(name)

@@ -215,9 +215,9 @@ _ALL = (
         "bad-kinds",
         "Kinds of frame begin with constants that tell them apart, and each message knows its kind.",
         "A receiver tries each kind where one may begin. Kinds have no terminator, idle line, stuffing, "
-        "coding, trim, blocks, seeds or values of every frame. A message without frame travels in the kinds "
-        "that no message names, which then have the same parts except constants, lengths and check values; "
-        "the shortest one that fits is sent.",
+        "coding, trim or blocks. A value or a counter of several kinds is the same in all. A message without "
+        "frame travels in the kinds that no message names, which then have the same parts except constants, "
+        "lengths and check values; the shortest one that fits is sent.",
     ),
     Rule(
         "short-frame",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from qlinkgen.model.frame import ATTRIBUTE, DelimitedFrame, Frame
+from qlinkgen.model.frame import ATTRIBUTE, DelimitedFrame, Frame, FrameKinds
 from qlinkgen.model.integer import byte_chunks, pack_chunks
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import Label
@@ -31,13 +31,22 @@ def check_types(file: SchemaFile, report: Reporter) -> None:
 
 def check_references(file: SchemaFile, report: Reporter, frame: Frame | None) -> None:
     """Check that check values cover declared numeric attributes."""
-    for part in frame.parts if isinstance(frame, DelimitedFrame) else ():
+    if isinstance(frame, FrameKinds):
+        for kind in frame.kinds:
+            _check_covered(file, report, kind.frame, ("frames", kind.name, "parts"))
+    elif isinstance(frame, DelimitedFrame):
+        _check_covered(file, report, frame, ("frame", "parts"))
+
+
+def _check_covered(file: SchemaFile, report: Reporter, frame: DelimitedFrame, path: Path) -> None:
+    """Check the attributes that the check values of a frame cover."""
+    for part in frame.parts:
         for index, covered in enumerate(part.checksum.over if part.checksum else ()):
             name = covered.removeprefix(ATTRIBUTE)
             spec = file.attributes.get(name)
             if covered == name or (spec and spec.type is not None):
                 continue
-            place = ("frame", "parts", part.name, "over", index)
+            place = (*path, part.name, "over", index)
             what = f"{shown(covered)} is not a declared attribute with a type"
             hint = f"declare it: attributes: {{{name}: {{type: u8}}}}"
             if spec is None:

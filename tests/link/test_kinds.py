@@ -10,6 +10,7 @@ from qlinkgen.backends.python import load as load_codec
 from qlinkgen.link import MasterEngine, Monitor, SlaveEngine, Timing
 from qlinkgen.link.monitor import Asked, Replied
 from qlinkgen.schema import find, load
+from qlinkgen.schema.loader import loads
 from qlinkgen.sim import VirtualPort, Wire
 from qlinkgen.sim.generic import GenericNode
 from qlinkgen.transport.blocking import BlockingMaster
@@ -51,3 +52,49 @@ def test_a_monitor_pairs_them(mbus: ModuleType) -> None:
     assert isinstance(asked, Asked)
     assert isinstance(replied, Replied)
     assert replied.response == mbus.Ack()
+
+
+COUNTED = """
+qlinkgen: 1
+protocol: {name: counted, revision: "1", source: Made up}
+byteorder: big
+attributes: {salt: {type: u8}}
+frames:
+  ask:
+    parts:
+      start: 10
+      code: {role: message, type: u8}
+      control: {type: u8, bits: {urgent: 0, turn: {at: 5, role: counter}}}
+      sum: {type: u8, algorithm: sum8, over: [code, control, attribute.salt]}
+  tell:
+    parts:
+      start: 68
+      code: {role: message, type: u8}
+      level: {type: i8, scale: 1/2}
+      data: {role: payload, size: 0..8}
+      sum: {type: u8, algorithm: sum8, over: [code, level, data, attribute.salt]}
+  taken: {parts: {byte: E5}}
+bus: {kind: master_slave, baud: 9600}
+defaults: {frame: ask, repeat: safe, attributes: {salt: 3}}
+messages: {taken: {frame: taken, direction: response, attributes: {salt: 0}, fields: {}}}
+commands:
+  begin: {id: 1, request: {}, response: taken}
+  read: {id: 2, attributes: {salt: 4}, request: {}, response: {frame: tell, id: 9, fields: {value: u16}}}
+"""
+
+
+def test_requests_are_numbered_in_the_kinds_that_have_a_counter() -> None:
+    protocol, faults = loads(COUNTED, "counted.yaml")
+    assert protocol is not None, faults
+    counted = load_codec(protocol)
+    wire = Wire(baud=9600)
+    wire.attach(SlaveEngine(counted, GenericNode(counted, 0), turnaround=0.001), "node")
+    master = BlockingMaster(MasterEngine(counted, Timing.of(counted, host_slack=SLACK)), VirtualPort(wire))
+    requests = [counted.BeginRequest(urgent=True), counted.BeginRequest(), counted.ReadRequest()]
+    answers = [master.transact(each).response for each in requests]
+    assert [each.turn for each in requests] == [0, 1, 0]
+    assert answers[0] == counted.Taken()
+    assert answers[2].level == 0
+    wire_bytes = counted.ReadResponse(level=-1.5, value=258).to_frame()
+    assert wire_bytes == bytes.fromhex("68 09 FD 01 02 0D")
+    assert counted.decode_response(wire_bytes) == counted.ReadResponse(level=-1.5, value=258)

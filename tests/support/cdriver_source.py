@@ -7,6 +7,7 @@ from pathlib import Path
 from qlinkgen.backends.c.interface import count_member, interface
 from qlinkgen.model import naming
 from qlinkgen.model.fields import Layout, Record, Records
+from qlinkgen.model.frame import FrameKinds
 from qlinkgen.model.message import Direction, Message, Value
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Scalar
@@ -84,7 +85,7 @@ class _Source:
             "    int total;",
         )
         self._add("    (void)node;")
-        if self.protocol.beside(message):
+        if self._takes_parts(message):
             self._add("    @p@_parts_t parts = @P@_PARTS_INIT;")
         for value in self.protocol.beside(message):
             self._add(*(f"    {line}" for line in _parsed(value, "parts.")))
@@ -108,7 +109,12 @@ class _Source:
             return self._filled("@p@_request_sum(bytes_a, from_hex(node, bytes_a)), ") if has_sum else ""
         bits = self.header.address_bits
         whom = f"(uint{bits}_t)strtoul(node, NULL, 0), " if bits else ""
-        return f"{whom}&parts, " if self.protocol.beside(message) else whom
+        return f"{whom}&parts, " if self._takes_parts(message) else whom
+
+    def _takes_parts(self, message: Message) -> bool:
+        """Whether a frame is made with values; of several kinds of frame, with those of any."""
+        several = isinstance(self.protocol.frame, FrameKinds)
+        return bool(self.protocol.frame_values if several else self.protocol.beside(message))
 
     def _decode(self, message: Message) -> None:
         function, stem = self.names.function(message), self.names.stem(message)
@@ -220,17 +226,23 @@ class _Source:
         self._add("        if (status != @P@_OK) {", '            printf("%s", kind_of(status));')
         self._add("        } else {", '            printf("message:%s:", name);', f"            {node}")
         for direction in self._directions():
-            values = self.protocol.beside(self.protocol.received(direction)[0])
-            if values:
-                self._add(f'            if (strcmp(direction, "{direction}") == 0) {{')
-            for value in values:
-                assert isinstance(value.type, Scalar)
-                form, cast = ("%lld", "long long") if value.type.signed else ("%llu", "unsigned long long")
-                self._add(
-                    f'                printf("{form}:", ({cast})frame.parts.{naming.member(value.name)});'
-                )
-            if values:
-                self._add("            }")
+            held = {self.names.constant(each): each for each in self.protocol.received(direction)}
+            held = {name: each for name, each in held.items() if self.protocol.beside(each)}
+            if not held:
+                continue
+            self._add(f'            if (strcmp(direction, "{direction}") == 0) {{')
+            self._add(f"                switch (frame.{field}) {{")
+            for name, message in held.items():
+                self._add(f"                case {name}_ID:")
+                for value in self.protocol.beside(message):
+                    assert isinstance(value.type, Scalar)
+                    form, cast = (
+                        ("%lld", "long long") if value.type.signed else ("%llu", "unsigned long long")
+                    )
+                    shown = f"({cast})frame.parts.{naming.member(value.name)}"
+                    self._add(f'                    printf("{form}:", {shown});')
+                self._add("                    break;")
+            self._add("                default: break;", "                }", "            }")
         self._add("            if (frame.size == 0u) { putchar('-'); }")
         self._add(
             "            put_digits(frame.payload, frame.size);",

@@ -180,7 +180,9 @@ class CheckWriter(Places):
         lines: list[str] = []
         for part in self.envelope.filling if self.alone is None else ():
             place = end if part in self.envelope.back else body
-            lines += self._computed(part, body, payload_end, f"{self.prefix}_seeds_({self.sender.id})")
+            lines += self._computed(
+                part, body, payload_end, f"{self.prefix}_seeds_({self.message_id(self.sender.id)})"
+            )
             lines += [f"    {line}" for line in put_check(part.check, place, self._at(part), "value")]
             lines.append("}")
         return lines
@@ -195,7 +197,7 @@ class CheckWriter(Places):
         lines = [line for part in late for line in self.judge(part, body, end, payload_end)]
         if seeded:
             directed = "direction, " if self.directed else ""
-            known = f"{self.prefix}_known_seeds_({directed}{self.number(self.envelope.id)})"
+            known = f"{self.prefix}_known_seeds_({directed}{self.message_id(self.number(self.envelope.id))})"
             lines += ["{", f"    const uint8_t *const seeds = {known};"]
             lines += indented(refusal("seeds == NULL", f"{self.prefix.upper()}_ERROR_UNKNOWN"))
             for part in seeded:

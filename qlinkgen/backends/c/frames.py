@@ -170,7 +170,7 @@ class FrameSection:
         name, protocol = self.view.address, self.plan.protocol
         broadcast = protocol.bus.broadcast is not None
         refused = list(framing.address_of(self.plan, name, "request").refused)
-        values = self.plan.frame.envelope.values  # of the response
+        values = self.plan.frame.values  # of the response
         summed = f"{protocol.name}_frame_sum(frame), " if self.request_sum else ""
         return DispatchView(
             is_broadcast=f"frame->{name} == {protocol.name.upper()}_BROADCAST" if broadcast else "false",

@@ -72,7 +72,7 @@ def seed_views(names: Names, messages: Sequence[MessagePlan]) -> list[SeedView]:
     found: dict[bytes, list[str]] = {}
     ids: set[int] = set()
     for each in messages:
-        if each.id not in ids:
+        if each.id not in ids and each.message.seeds:
             ids.add(each.id)
             data = b"".join(data for _, data in each.message.seeds)
             found.setdefault(data, []).append(names.constant(each.message))

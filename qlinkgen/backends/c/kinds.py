@@ -9,7 +9,7 @@ from qlinkgen.backends.c.crc import CheckView
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.backends.c.parts import PartWriter
-from qlinkgen.backends.c.places import in_hex, sender_of
+from qlinkgen.backends.c.places import id_bits, in_hex, sender_of
 from qlinkgen.backends.c.views import (
     FrameView,
     PartsView,
@@ -19,6 +19,7 @@ from qlinkgen.backends.c.views import (
     own_prefix,
     parts_view,
     plain_view,
+    seeds_of,
 )
 from qlinkgen.plan.ends import ByMessage
 from qlinkgen.plan.framing import FramePlan
@@ -40,6 +41,7 @@ class KindView:
         key: what the names of the functions of its only check value begin with.
         check: the algorithm of that, None if there is none or several.
         unused: parameters that the function that wraps does not use.
+        get_values: statements that read the values of a received frame.
     """
 
     name: str
@@ -52,6 +54,7 @@ class KindView:
     key: str
     check: CheckView | None
     unused: list[str]
+    get_values: list[str]
     most: int
     parts: PartsView
     plain: PlainView
@@ -120,9 +123,11 @@ def _writer(plan: Plan, kind: FramePlan, layouts: Layouts) -> PartWriter:
         kind,
         sender_of(kind, prefix),
         layouts,
+        seeds=seeds_of(plan),
         directed=directed(plan),
         own=own_prefix(prefix, kind.name),
         every=tuple(each.envelope for each in plan.frame.kinds),
+        id_bits=id_bits(plan.frame),
     )
 
 
@@ -139,22 +144,19 @@ def _kind(
     check = writer.algorithms[alone.check.algorithm] if alone else None
     parts = parts_view(writer, kind.max_wire)
     bits = frame.id_bits
-    number = f"({frame.id_type}){writer.number(kind.envelope.id)}" if kind.envelope.id else "0U"
-    if kind.base:
-        base = unsigned(kind.base, bits, hexadecimal=True)
-        number = f"({base} | {number})" if kind.envelope.id else base
     by_message = isinstance(kind.end, ByMessage)
     return KindView(
         name=kind.name,
         carries=_carries(plan.frame, kind, bits),
         parameters=sender.parameters,
         arguments=_arguments(kind, frame, sender.id_type, sender.address),
-        id=number,
+        id=writer.message_id(writer.number(kind.envelope.id)),
         address=parts.address_value if sender.address else "0U",
         sized_by_message=by_message,
         key=check.key if check else "",
         check=check,
         unused=[sender.id] if not kind.envelope.id else [],
+        get_values=writer.get_values() if plan.frame.values else [],
         most=kind.max_payload,
         parts=parts,
         plain=plain_view(writer, frame.pass_decode_direction),
@@ -178,4 +180,5 @@ def _arguments(kind: FramePlan, frame: FrameView, id_type: str, address: str) ->
     number = frame.id
     if id_type != frame.id_type or kind.base:
         number = f"({id_type})({frame.id} & {unsigned((1 << own) - 1, own, hexadecimal=True)})"
-    return f"{number}, {frame.address}" if address else number
+    given = [number, *([frame.address] if address else []), *(["parts"] if kind.values else [])]
+    return ", ".join(given)

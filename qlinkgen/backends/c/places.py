@@ -46,7 +46,7 @@ class Sender:
 def sender_of(frame: FramePlan, prefix: str) -> Sender:
     """The sender of a frame; names are "id" and that of the address, changed if taken."""
     if frame.kinds:
-        return _sender_of_kinds(frame)
+        return _sender_of_kinds(frame, prefix)
     envelope = frame.envelope
     address = address_member(frame.address)
     address_type = unsigned_type(envelope.address[0].bits if envelope.address else 8)
@@ -65,8 +65,8 @@ def id_bits(frame: FramePlan) -> int:
     return max((base | (1 << size) - 1).bit_length() for base, size in numbers) or 8
 
 
-def _sender_of_kinds(frame: FramePlan) -> Sender:
-    """Several kinds have the address of any of them."""
+def _sender_of_kinds(frame: FramePlan, prefix: str) -> Sender:
+    """Several kinds have the address and the values of any of them."""
     address = address_member(frame.address)
     sizes = [bits.bits for kind in frame.kinds for bits in kind.envelope.address[:1]]
     return Sender(
@@ -74,7 +74,7 @@ def _sender_of_kinds(frame: FramePlan) -> Sender:
         unsigned_type(id_bits(frame)),
         address,
         unsigned_type(sizes[0]) if sizes else "",
-        "",
+        f"{prefix}_parts_t" if frame.values else "",
     )
 
 
@@ -98,6 +98,8 @@ class Places:
     own: str = ""
     #: The frames of all directions.
     every: tuple[Envelope, ...] = ()
+    #: Bits of a message id, if that has more than the number in the frame.
+    id_bits: int = 0
 
     @property
     def envelope(self) -> Envelope:
@@ -136,6 +138,16 @@ class Places:
         return self.envelope.parts[1:] if self.lead else self.envelope.parts
 
     # Numbers
+
+    def message_id(self, number: str) -> str:
+        """The id of a message by its number in the frame."""
+        if not self.id_bits:
+            return number
+        numbered = f"({unsigned_type(self.id_bits)}){number}" if self.envelope.id else "0U"
+        if not self.frame.base:
+            return numbered
+        base = unsigned(self.frame.base, self.id_bits, hexadecimal=True)
+        return f"({base} | {numbered})" if self.envelope.id else base
 
     def number(self, pieces: tuple[Bits, ...]) -> str:
         """The message id or address in these pieces of a received frame, 0 if there are none."""

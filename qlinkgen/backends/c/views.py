@@ -329,7 +329,7 @@ def parts_views(whole: Plan, layouts: Layouts) -> dict[str, PartsViews]:
 
 
 def _parts_views(whole: Plan, plan: Plan, way: str, layouts: Layouts) -> PartsViews:
-    seeds = plan.messages[0].message.seeds if plan.messages else ()
+    seeds = seeds_of(plan)
     sender = sender_of(plan.frame, plan.protocol.name)
     prefix, passes = plan.protocol.name, directed(whole)
     every = (whole.frame.envelope, *([whole.frames["request"].envelope] if way else []))
@@ -375,6 +375,11 @@ def _parts_views(whole: Plan, plan: Plan, way: str, layouts: Layouts) -> PartsVi
             _ended(writer, passed), head_checks=list(writer.head_checks("at", passed, all_there=False))
         ),
     )
+
+
+def seeds_of(plan: Plan) -> tuple[tuple[str, bytes], ...]:
+    """The seeds of a message: all that have any have them of the same attributes."""
+    return next((each.message.seeds for each in plan.messages if each.message.seeds), ())
 
 
 def parts_view(writer: PartWriter, max_wire: int) -> PartsView:

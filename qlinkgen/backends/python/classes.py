@@ -86,6 +86,7 @@ class Shape:
     default_address: int
     checked: bool
     direction: str
+    members: tuple[Member, ...]
 
 
 class ClassBuilder:
@@ -109,7 +110,9 @@ class ClassBuilder:
         return [*records, *shapes, *map(self._message, self._plan.messages)]
 
     def _within(self, message: MessagePlan) -> Place:
-        """The place of a message: the frames of its direction, or no frame for a record."""
+        """The place of a message: the frames of its direction or kind, or no frame for a record."""
+        if self._plan.frame.kinds:
+            return self._place.within(message.envelope) if message.frames else self._place
         return self._place.within(self._plan.frames[message.direction].envelope)
 
     @property
@@ -139,6 +142,7 @@ class ClassBuilder:
             message.message.default_address,
             message.checked,
             message.direction if self._divided else "",
+            self._within(message).members,
         )
 
     @property
@@ -195,7 +199,7 @@ class ClassBuilder:
         decoder = make_decoder(message, place, title, scales)
         name = "" if place.envelope is None else "body"
         encode = encoder.statements(name)
-        stored = (*place.beside, *message.payload.settable)
+        stored = (*(place.beside if place.envelope else ()), *message.payload.settable)
         names = sorted({held(each) for each in stored}, key=natural)
         return replace(
             head,
@@ -231,10 +235,18 @@ class ClassBuilder:
         return ["CHECKED = True"] if marked and not self._all_checked and message.checked else []
 
     def _kind(self, message: MessagePlan) -> list[str]:
-        """What tells the kind of its frame, and whether that has an address."""
+        """What tells the kind of its frame, and whether that has an address, values and a counter."""
         base = message.frames[-1].base
         addressed = message.allowed is not None or not self._place.address
-        return [*([f"FAMILY = {in_hex(base)}"] if base else []), *([] if addressed else ['ADDRESS = ""'])]
+        names = [attribute(member.name) for _, member in message.envelope.values]
+        counter = self._plan.protocol.counter
+        counted = [values.counter_fact(counter)] if counter and attribute(counter.name) in names else []
+        return [
+            *([f"FAMILY = {in_hex(base)}"] if base else []),
+            *([] if addressed else ['ADDRESS = ""']),
+            *(listing("PARTS = (", [f'"{name}"' for name in names], ")", 4) if names else []),
+            *(f"COUNTER = {fact}" for fact in counted),
+        ]
 
     # Parts of a class
 
@@ -243,10 +255,11 @@ class ClassBuilder:
         found = {}
         for each in (*self._within(message).beside, *message.payload.settable):
             if isinstance(each, ValueStep | Member | ItemsStep) and each.number.scaling is not None:
-                found[each.name] = self._scale(each.name, each.number)
+                found[each.name] = self.scale(each.name, each.number)
         return found
 
-    def _scale(self, field_name: str, number: Scalar) -> str:
+    def scale(self, field_name: str, number: Scalar) -> str:
+        """The name of the constant that converts a value."""
         call = values.scale_arguments(number, self._place)
         base = f"_SCALE_{(number.type_name or field_name).upper()}"
         name, count = base, 2

@@ -153,7 +153,7 @@ class Decoder:
         elif place.address and self.message.allowed is not None:
             # The caller sets the real address.
             chosen = [f"{place.address}={self.message.message.default_address}", *chosen]
-        if not place.beside:
+        if not place.beside or place.envelope is None:
             lines += wrapped("return cls(", chosen, ")", _INDENT + 4)
             return [f"if {test}:", *indented(lines)]
         lines += wrapped("message = cls(", chosen, ")", _INDENT + 4)
@@ -168,8 +168,8 @@ class Decoder:
             seen = pieces.read(place.envelope, part, place.data, place.skipped)
             shifted = f"{seen} >> {member.shift}" if member.shift else seen
             taken = f"{shifted} & 0x{(1 << member.bits) - 1:X}" if member.bits < part.integer.bits else seen
-            reader._member(member, taken, self._place_of(part), place.data)  # its own class
-        return reader._values
+            reader.get_member(member, taken, self._place_of(part), place.data)
+        return reader.assignments
 
     # Parts of the frame
 
@@ -212,7 +212,7 @@ class Decoder:
                 self._values += self._address_check(part, number, _INDENT)
                 self._values.append(f"message.{self.place.address} = {number}")
             elif isinstance(slot, Member):
-                self._member(slot, taken, self._place_of(part), self.place.data)
+                self.get_member(slot, taken, self._place_of(part), self.place.data)
 
     def _place_of(self, part: Part) -> str:
         """The offset of a part in the argument, negative from its end."""
@@ -515,9 +515,15 @@ class Decoder:
         for member in step.members:
             mask = (1 << member.bits) - 1
             taken = f"{whole} >> {member.shift} & 0x{mask:X}" if member.shift else f"{whole} & 0x{mask:X}"
-            self._member(member, taken, self._offset(step))
+            self.get_member(member, taken, self._offset(step))
 
-    def _member(self, member: Member, taken: str, offset: str, data: str = "") -> None:
+    @property
+    def assignments(self) -> list[str]:
+        """The statements so far that check and assign values."""
+        return self._values
+
+    def get_member(self, member: Member, taken: str, offset: str, data: str = "") -> None:
+        """Check and assign the value that some bits hold."""
         raw, target = f"{member.name}_raw", f"message.{held(member)}"
         if member.number.signed:
             taken = integers.sign_extended(f"({taken})", member.bits)

@@ -106,7 +106,16 @@ class Encoder:
             self._step(step)
         for part in self.place.back:
             self._part(part)
-        return [*self._lines, *self._guard(), *self._late, *self._expression(name)]
+        return [*self.checks, *self._late, *self._expression(name)]
+
+    def put_member(self, member: Member) -> None:
+        """Convert and check a value of the frame."""
+        self._member(member)
+
+    @property
+    def checks(self) -> list[str]:
+        """The statements so far that convert and check values."""
+        return [*self._lines, *self._guard()]
 
     def _guard(self) -> list[str]:
         """The statement that raises where a condition does not hold."""

@@ -25,6 +25,7 @@ from qlinkgen.backends.python.frame_views import (
 )
 from qlinkgen.backends.python.layout import in_hex, literal, slice_of
 from qlinkgen.backends.python.names import attribute
+from qlinkgen.backends.python.values import counter_fact
 from qlinkgen.model.checksum import Sum
 from qlinkgen.model.frame import Silence
 from qlinkgen.model.integer import ByteOrder
@@ -237,10 +238,7 @@ def _blank_trailer(envelope: Envelope, address: AddressView | None) -> str:
 def _counter(plan: Plan) -> str:
     """The counter of frames as a tuple, "" if there is none."""
     counter = plan.protocol.counter
-    if counter is None or counter.counting is None:
-        return ""
-    facts = (attribute(counter.name), 1 << counter.bits, counter.counting.per_frame, counter.counting.echo)
-    return f'("{facts[0]}", {facts[1]}, {facts[2]}, {facts[3]})'
+    return counter_fact(counter) if counter else ""
 
 
 def _trails(envelope: Envelope) -> bool:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import assert_never
 
-from qlinkgen.backends.python import integers, pieces
-from qlinkgen.backends.python.frame_checks import check_view, placed
+from qlinkgen.backends.python import integers, pieces, values
+from qlinkgen.backends.python.decode import Decoder
+from qlinkgen.backends.python.encode import Encoder
+from qlinkgen.backends.python.frame_checks import check_view, placed, seed_name
 from qlinkgen.backends.python.frame_views import FrameView, PlacedCheck
 from qlinkgen.backends.python.layout import in_hex, literal
+from qlinkgen.backends.python.names import attribute, natural
+from qlinkgen.backends.python.place import Place
 from qlinkgen.model.naming import address_argument, address_attribute
+from qlinkgen.model.types import Scalar
 from qlinkgen.plan.ends import ByLength
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.framing import FramePlan
@@ -30,10 +35,11 @@ from qlinkgen.plan.parts import (
     Numeric,
     Part,
     PayloadPart,
+    Seed,
     Slot,
 )
-from qlinkgen.plan.payload import Member
-from qlinkgen.plan.tree import Plan
+from qlinkgen.plan.payload import Member, by_slot
+from qlinkgen.plan.tree import MessagePlan, Plan
 
 
 @dataclass(frozen=True)
@@ -56,6 +62,9 @@ class KindView:
         number: the number of the message in ``frame``, or in its header ``head``.
         address: the address in ``frame``, "None" without one.
         verified: contents that are wrong do not deny a frame with a valid check value.
+        seeded: that covers attributes of the message.
+        checked_values: statements that convert and check the values of the frame of ``message``.
+        held_values: statements that set the values of ``message`` from ``frame``.
     """
 
     name: str
@@ -75,6 +84,9 @@ class KindView:
     number: str
     address: str
     verified: bool
+    seeded: bool
+    checked_values: Sequence[str]
+    held_values: Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -84,6 +96,15 @@ class AddressNames:
     name: str
     parameter: str
     default: int
+
+
+@dataclass(frozen=True)
+class ValueView:
+    """A value of frames in Python: its attribute, the type of that, and its default."""
+
+    name: str
+    annotation: str
+    default: str
 
 
 @dataclass(frozen=True)
@@ -98,6 +119,10 @@ class KindsView:
         measured: the message gives the size of some kinds.
         idle: as for other frames.
         check: no algorithm can be replaced.
+        values: the values of frames of any kind.
+        slots: the names of attributes of all messages.
+        seeds: attributes of message classes that check values cover.
+        counted: some kinds have a counter.
     """
 
     title: str
@@ -108,6 +133,10 @@ class KindsView:
     families: Sequence[tuple[str, Sequence[tuple[int, KindView, int]]]]
     measured: bool
     makers: frozenset[str]
+    values: Sequence[ValueView]
+    slots: Sequence[str]
+    seeds: Sequence[str]
+    counted: bool
 
     template = "kinds"
     check = None
@@ -117,9 +146,9 @@ class KindsView:
 AnyView = FrameView | KindsView
 
 
-def kinds_view(plan: Plan, title: str) -> KindsView:
-    """The view of the kinds of frame of a protocol."""
-    views = {frame.name: _kind(frame) for frame in plan.frame.kinds}
+def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
+    """The view of the kinds of frame of a protocol; ``make`` names its conversions."""
+    views = {frame.name: _kind(frame, plan, make) for frame in plan.frame.kinds}
     firsts: dict[int, list[KindView]] = {}
     families: dict[int, list[tuple[int, KindView, int]]] = {}
     for frame in sorted(plan.frame.kinds, key=lambda each: each.max_payload):
@@ -137,18 +166,37 @@ def kinds_view(plan: Plan, title: str) -> KindsView:
         by_first=[(in_hex(first), kinds) for first, kinds in firsts.items()],
         families=[(in_hex(base), kinds) for base, kinds in families.items()],
         measured=any(not view.size for view in views.values()),
+        values=[_value(member, make.place) for member in plan.frame.values.values()],
+        slots=sorted([*([address.name] if name else []), *map(attribute, plan.frame.values)], key=natural),
+        seeds=sorted({seed_name(seed) for each in plan.frame.kinds for seed in _seeds(each)}),
+        counted=plan.protocol.counter is not None,
         makers=frozenset(check.view.maker for view in views.values() for check in view.checks),
     )
 
 
-def _kind(frame: FramePlan) -> KindView:
+def _value(member: Member, place: Place) -> ValueView:
+    kind = values.annotation(by_slot([member])[0], place)
+    return ValueView(attribute(member.name), kind, values.default(member, place))
+
+
+def _seeds(frame: FramePlan) -> Iterator[Seed]:
+    for part in frame.envelope.checks:
+        yield from frame.envelope.seeds(part)
+
+
+def _kind(frame: FramePlan, plan: Plan, make: Maker) -> KindView:
     envelope = frame.envelope
+    carried = next((each for each in plan.messages if frame in each.frames), None)
+    members = Members(envelope, carried, make) if carried and envelope.values else None
     checks = {part.name: _check(envelope, part, frame.name) for part in envelope.checks}
     base = f"{frame.base} + " if frame.base else ""
     addressed = bool(envelope.address)
     return KindView(
         name=frame.name,
         numbers=list(_numbers(envelope)),
+        checked_values=members.checked if members else [],
+        held_values=members.held if members else [],
+        seeded=bool(envelope.seeded),
         front=" + ".join(_bytes(part) for part in envelope.front) or 'b""',
         back=" + ".join(_bytes(part) for part in envelope.back),
         addressed=addressed,
@@ -190,6 +238,46 @@ def _size(frame: FramePlan, envelope: Envelope) -> str:
     seen = f"{seen} * {part.scale}" if part.scale > 1 else seen
     more = envelope.overhead - part.bias
     return f"{seen} {'+' if more > 0 else '-'} {abs(more)}" if more else seen
+
+
+@dataclass(frozen=True)
+class Maker:
+    """What the code of values uses: the place of payloads, and the names of conversions."""
+
+    place: Place
+    scale: Callable[[str, Scalar], str]
+
+
+class Members:
+    """The values of a kind of frame.
+
+    Attributes:
+        checked: statements that convert and check those of ``message``.
+        held: statements that set those of ``message`` from ``frame``.
+    """
+
+    checked: Sequence[str]
+    held: Sequence[str]
+
+    def __init__(self, envelope: Envelope, message: MessagePlan, make: Maker) -> None:
+        """``message`` is one that the frame carries."""
+        scaled = [member for _, member in envelope.values if member.number.scaling is not None]
+        scales = {each.name: make.scale(each.name, each.number) for each in scaled}
+        encoder = Encoder(message, make.place, "", "", scales)
+        decoder = Decoder(message, make.place, "", scales)
+        for part, member in envelope.values:
+            encoder.put_member(member)
+            place = -envelope.from_end(part) if part in envelope.back else envelope.offset(part)
+            seen = pieces.read(envelope, part, "frame")
+            if member.bits < part.integer.bits:
+                seen = f"({seen})" if " " in seen else seen
+                seen = f"{seen} >> {member.shift}" if member.shift else seen
+                seen = f"{seen} & 0x{(1 << member.bits) - 1:X}"
+            decoder.get_member(member, seen, str(place), "frame")
+        # The statements are those of a method of the message.
+        self.checked = [line.replace("self.", "message.") for line in encoder.checks]
+        lines = decoder.assignments
+        self.held = ["cls = type(message)", *lines] if any("illegal(" in line for line in lines) else lines
 
 
 # Making a frame
@@ -243,7 +331,10 @@ def _bits(slot: Slot) -> str:
         case ConstantSlot():
             return in_hex(slot.values[0] << slot.shift)
         case Member():
-            raise AssertionError(f"kinds of frame have no values: {slot.name}")
+            number = f"{slot.name}_raw"
+            if slot.number.signed:
+                number = f"({number} & {in_hex((1 << slot.bits) - 1)})"
+            return f"{number} << {slot.shift}" if slot.shift else number
         case _:
             assert_never(slot)
 

@@ -20,7 +20,7 @@ from qlinkgen.backends.python.frame_directions import (
     unknown_view,
 )
 from qlinkgen.backends.python.frame_views import MarkedView, PacketView, PartsView, UniqueView
-from qlinkgen.backends.python.kinds import AnyView, KindsView, kinds_view
+from qlinkgen.backends.python.kinds import AnyView, KindsView, Maker, kinds_view
 from qlinkgen.backends.python.layout import WIDTH, wrapped
 from qlinkgen.backends.python.names import by_kind, class_name, imported
 from qlinkgen.backends.python.place import Place, place_of
@@ -132,7 +132,10 @@ class Module:
         plan, models = self.plan, self.builder.build()
         sizes = sorted({each.body_size for each in models if each.body_size is not None})
         title = one_line(plan.protocol.title)
-        views: Mapping[str, AnyView] = {way: _view(each, title, sizes) for way, each in plan.ways.items()}
+        make = Maker(self.place, self.builder.scale)
+        views: Mapping[str, AnyView] = {
+            way: _view(each, title, sizes, make) for way, each in plan.ways.items()
+        }
         view, sections = views[list(views)[-1]], Sections(views, plan.received_directions, bool(plan.beside))
         decoded = decoded_directions(plan, sections.ways)
         quoted = [f'"{each.direction}"' for each in decoded]
@@ -247,6 +250,7 @@ class Module:
             case KindsView():
                 used |= {"wrong_check", *view.makers} if view.makers else set()
                 used |= {"illegal", "index", "refused"} if view.address else set()
+                used |= {"REFUSALS", "settled"} if view.values else set()
         seeds = isinstance(view, PartsView) and view.seeds
         held = self.plan.directed and bool(self.plan.beside)
         if isinstance(view, UniqueView | PartsView) and not view.address and not seeds and not held:
@@ -292,8 +296,8 @@ class Module:
         return sorted(set(names), key=by_kind)
 
 
-def _view(plan: Plan, title: str, sizes: Sequence[int]) -> AnyView:
-    return kinds_view(plan, title) if plan.frame.kinds else frames.view_of(plan, title, sizes)
+def _view(plan: Plan, title: str, sizes: Sequence[int], make: Maker) -> AnyView:
+    return kinds_view(plan, title, make) if plan.frame.kinds else frames.view_of(plan, title, sizes)
 
 
 def _asked(plan: Plan) -> list[str]:

@@ -28,6 +28,7 @@ class Place:
         address: attribute that holds the address, "" if there is none.
         unique: the last step of an encoder adds the preamble, and the receiver checks it.
         texts: print text defaults as text, not as numbers.
+        members: values of the frame of a message, if its class handles only its payload.
         used: names of imports used so far.
         checks: algorithms of the check values in payloads so far.
     """
@@ -38,6 +39,7 @@ class Place:
     address: str
     unique: bool
     texts: bool = True
+    members: tuple[Member, ...] = ()
     used: set[str] = field(default_factory=set, compare=False)
     checks: list[Checksum] = field(default_factory=list, compare=False)
 
@@ -58,8 +60,10 @@ class Place:
         return replace(self, envelope=None, address="", unique=False)
 
     def within(self, envelope: Envelope) -> Place:
-        """The place in the frames of a direction."""
-        return replace(self, envelope=envelope) if self.envelope else self
+        """The place in the frames of a direction or kind."""
+        if self.envelope:
+            return replace(self, envelope=envelope)
+        return replace(self, members=tuple(member for _, member in envelope.values))
 
     @property
     def prefix(self) -> str:
@@ -100,7 +104,7 @@ class Place:
     @property
     def beside(self) -> tuple[Member, ...]:
         """Values of every frame."""
-        return tuple(member for _, member in self.envelope.values) if self.envelope else ()
+        return tuple(member for _, member in self.envelope.values) if self.envelope else self.members
 
     @property
     def data(self) -> str:

@@ -13,6 +13,7 @@ from qlinkgen.backends.python.names import attribute, held
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.varied import is_last
 from qlinkgen.model.condition import Test
+from qlinkgen.model.frame import PartBits
 from qlinkgen.model.message import Value
 from qlinkgen.model.types import Enum, Flags, Float, Scalar
 from qlinkgen.model.values import Native, native_from_raw
@@ -161,6 +162,13 @@ def _native(value: Native) -> str:
     if isinstance(value, float) and not math.isfinite(value):
         return f'float("{value}")'
     return repr(value)
+
+
+def counter_fact(counter: PartBits) -> str:
+    """A counter of frames as a tuple: attribute, number of values, and what it counts."""
+    assert counter.counting is not None
+    facts = (1 << counter.bits, counter.counting.per_frame, counter.counting.echo)
+    return f'("{attribute(counter.name)}", {facts[0]}, {facts[1]}, {facts[2]})'
 
 
 # Scales and rules

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from tests.support.whole.frames import Shape, draw_algorithm, order, width_type
+from tests.support.whole.mixed import draw_value
 
 Doc = dict[str, Any]
 _LEADS = ("68", "10", "02", "A5 5A", "A5 A5", "24 4D", "24 58", "FF", "7E 01", "3A")
@@ -71,9 +72,53 @@ def draw(rng: random.Random) -> Kinds:
         families.append(Family(shape, next(reversed(frames))))
     for each in families:
         each.shape.bus = families[0].shape.bus
+    # Drawn from another source: the schemas of earlier seeds stay what they are.
+    _add_values(random.Random(repr(rng.getstate())), frames, families)
     mixed = list(frames)
     rng.shuffle(mixed)
     return Kinds({name: frames[name] for name in mixed}, families)
+
+
+def _add_values(rng: random.Random, frames: Doc, families: list[Family]) -> None:
+    """Values of some kinds of frame, and an attribute of messages that some check values cover."""
+    known: Doc = {"status": draw_value(rng), "component": draw_value(rng)}
+    counter: Doc = {"role": "counter", **rng.choice(({}, {"per": "frame"}))}
+    known["sequence"] = {**counter, "type": rng.choice(("u8", "u16"))}
+    if rng.random() < 0.3:
+        bits = {"toggle": {**counter, "at": 5}, "grade": {"at": "0..2", "signed": True}, "ready": 7}
+        known["sequence"] = {"type": "u8", "bits": bits}
+    held = [name for name in known if rng.random() < 0.4]
+    seeds: Doc = {"crc_extra": {"type": rng.choice(("u8", "u16", "u32"))}} if rng.random() < 0.2 else {}
+    named = {each.name for each in families}
+    for each in families:
+        own = [frames[each.name]] if each.name else [frames[name] for name in frames if name not in named]
+        if set(own[0]["parts"]) == {"byte"}:
+            continue
+        chosen = {name: rng.random() for name in held if rng.random() < 0.7}
+        covered = rng.random() < 0.5
+        for kind in own:
+            for name, place in chosen.items():
+                kind["parts"] = _with_value(kind["parts"], name, known[name], place, covered=covered)
+        if all("crc" in kind["parts"] for kind in own):
+            each.shape.seeds = seeds
+            for kind in own if seeds else ():
+                kind["parts"]["crc"]["over"] = [*kind["parts"]["crc"]["over"], "attribute.crc_extra"]
+        each.shape.frame["parts"] = own[0]["parts"]
+
+
+def _with_value(parts: Doc, name: str, spec: Doc, place: float, *, covered: bool) -> Doc:
+    """The parts with one more: before the payload, after it, or at the end."""
+    names = list(parts)
+    payload = names.index("data") if "data" in parts else len(names)
+    # The same order in every kind of a family.
+    behind = payload + 1 if place < 0.75 else len(names)
+    at = 1 + int(2 * place * payload) if place < 0.5 else behind
+    names.insert(min(max(1, at), len(names)), name)
+    found = {each: spec if each == name else parts[each] for each in names}
+    if covered and "crc" in found:
+        over = [each for each in names if each in {*found["crc"]["over"], name}]
+        found["crc"] = {**found["crc"], "over": over}
+    return found
 
 
 def _identified(rng: random.Random, *, variable: bool) -> tuple[Doc, list[tuple[str, int]], int]:

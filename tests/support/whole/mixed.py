@@ -11,6 +11,17 @@ from tests.support.whole.reference.fields import bits_of_type
 Doc = dict[str, Any]
 
 
+def draw_value(rng: random.Random) -> Doc:
+    """A value of every frame."""
+    spec: Doc = {"type": rng.choice(("u8", "u8", "u16", "i8", "i24", "u32", "u40"))}
+    if rng.random() < 0.4:
+        low = rng.choice((0, 1, 3))
+        spec |= {"range": f"{low}..{low + rng.choice((0, 4, 100))}", "default": low}
+    elif rng.random() < 0.4:
+        spec |= {"scale": "1/2"} if rng.random() < 0.5 else {"default": rng.choice((0, 1, 5))}
+    return spec
+
+
 @dataclass
 class Mixture:
     """Parts before and after the payload by name, and what they identify.
@@ -53,7 +64,7 @@ class Mixture:
         self._count(parts)
         for name in ("component", "status"):
             if rng.random() < 0.3:
-                parts[name] = self._value()
+                parts[name] = draw_value(rng)
         self._place(parts, may_trail=has_length)
         self._derive()
         self._measure()
@@ -92,17 +103,6 @@ class Mixture:
             parts["sequence"] = {**counter, "type": rng.choice(("u8", "u16"))}
         elif (last := int(parts["head"]["type"][1:]) - 1) not in _used(parts["head"]):
             parts["head"]["bits"]["toggle"] = {**counter, "at": last}
-
-    def _value(self) -> Doc:
-        """A value of every frame."""
-        rng = self.rng
-        spec: Doc = {"type": rng.choice(("u8", "u8", "u16", "i8", "i24", "u32", "u40"))}
-        if rng.random() < 0.4:
-            low = rng.choice((0, 1, 3))
-            spec |= {"range": f"{low}..{low + rng.choice((0, 4, 100))}", "default": low}
-        elif rng.random() < 0.4:
-            spec |= {"scale": "1/2"} if rng.random() < 0.5 else {"default": rng.choice((0, 1, 5))}
-        return spec
 
     def _type(self) -> str:
         return self.rng.choices(("u8", "u16", "u24", "u32", "u40", "u48"), (30, 5, 1, 2, 1, 1))[0]

@@ -125,6 +125,10 @@ class _Maker:
                     message["direction"] = "response"
                 found["messages"][self.words.name(taken)] = message | family.spec
         self._answered_otherwise(several, maker, found)
+        self._seeds(
+            next((each.shape for each in several.families if each.shape.seeds), several.families[0].shape),
+            found,
+        )
         return {key: value for key, value in found.items() if value or key == "commands"}
 
     def _answered_otherwise(self, several: Kinds, maker: FieldMaker, found: Doc) -> None:

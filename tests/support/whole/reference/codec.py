@@ -45,7 +45,7 @@ class Reference:
         self.messages: tuple[Message, ...]
         self.asked: Asked | None = None
         if "frames" in data:
-            self._read_kinds(Kinds(data))
+            self._read_kinds(data, Kinds(data))
         else:
             self._read(data)
         self.by_name = {message.name: message for message in self.messages}
@@ -54,11 +54,17 @@ class Reference:
             ("message",) if used == {"message"} else ("request", "response")
         )
 
-    def _read_kinds(self, kinds: Kinds) -> None:
+    def _read_kinds(self, data: Doc, kinds: Kinds) -> None:
         self.frame = self.requests = kinds
         names = [name for each in kinds.documents.values() if (name := address_of(each))]
         self.address_name = names[0] if names else None
         self.messages = tuple(kinds.messages())
+        for name, frame in kinds.frames.items():
+            carried = [each for each in self.messages if name in each.frames]
+            frame.seeds = {each.number: document.seeds(data, each.name) for each in carried}
+        self.messages = tuple(
+            replace(each, beside=kinds.frames[each.frames[0]].beside) for each in self.messages
+        )
 
     def _read(self, data: Doc) -> None:
         shape = data["frame"]
