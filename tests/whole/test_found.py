@@ -161,10 +161,11 @@ FOUND = {
     "a field called like the type of another, which C++ refuses": _PARTS
     + _BUS
     + "messages:\n  log: {id: 5, fields: {v: u8, uint8_t: u8, int64_t: i64}}\n",
-    "a field that a value adds, which C did not cover by the check value": _COUNTED.replace(
+    "a count that a value adds, which C did not cover by the check value": _COUNTED.replace(
         "0..40}", "0..40}\n    crc: {type: u8, algorithm: sum8, over: [code, data]}"
     )
-    + 'messages:\n  log: {id: 5, fields: {on: bool, v: "u8[2]", w: {type: u8, if: on}}}\n',
+    + "messages:\n  log: {id: 5, fields: {on: bool, n: {type: u8, counts: v, if: on},"
+    ' v: {type: "u8[1..3]", if: on}}}\n',
 }
 
 
