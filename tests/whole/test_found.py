@@ -161,6 +161,11 @@ FOUND = {
     "a field called like the type of another, which C++ refuses": _PARTS
     + _BUS
     + "messages:\n  log: {id: 5, fields: {v: u8, uint8_t: u8, int64_t: i64}}\n",
+    "a check value over a part after one that it does not cover, which Python placed wrongly": _PARTS.replace(
+        "    crc:", '    one: "01"\n    two: "02"\n    crc:'
+    ).replace("over: [code, data]", "over: [code, data, two]")
+    + _BUS
+    + "messages:\n  log: {id: 5, fields: {v: u8}}\n",
     "a count that a value adds, which C did not cover by the check value": _COUNTED.replace(
         "0..40}", "0..40}\n    crc: {type: u8, algorithm: sum8, over: [code, data]}"
     )

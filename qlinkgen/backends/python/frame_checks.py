@@ -94,7 +94,7 @@ def placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> Pl
         start=start,
         end=end,
         covered=covered,
-        ahead="" if end else _covered(envelope, part, "body", start),
+        ahead="" if end else _covered(envelope, part, "body", part.check.size),
         otherwise=part.check.otherwise,
         mark=mark,
         seeded=seeded,
@@ -106,8 +106,8 @@ def placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> Pl
     )
 
 
-def _covered(envelope: Envelope, part: CheckPart, data: str, end: str = "") -> str:
-    """Expression for the bytes that a check value covers; ``end`` is the place of the end of the data."""
+def _covered(envelope: Envelope, part: CheckPart, data: str, without: int = 0) -> str:
+    """Expression for the bytes that a check value covers, in a frame ``without`` its last bytes."""
     found = []
     for run in envelope.coverage(part):
         if isinstance(run, Seed):
@@ -115,10 +115,16 @@ def _covered(envelope: Envelope, part: CheckPart, data: str, end: str = "") -> s
             continue
         for group, always in _groups(envelope, run):
             first, after = _edge(envelope, group[0]), _edge(envelope, group[-1], after=True)
-            cut = f"[{first}:{after if after != end else ''}]"
+            cut = f"[{_nearer(first, without)}:{_nearer(after, without)}]"
             text = data if cut == "[:]" else data + cut
             found.append(text if always else f'({text} if _has_before({data}) else b"")')
     return " + ".join(found)
+
+
+def _nearer(place: str, without: int) -> str:
+    """A place counted from the end, if that is moved to the front."""
+    number = int(place or "0")
+    return str(number + without or "") if number < 0 else place
 
 
 def _groups(envelope: Envelope, run: Sequence[Part]) -> Iterator[tuple[Sequence[Part], bool]]:
