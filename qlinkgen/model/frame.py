@@ -183,19 +183,6 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
-class Stuffing:
-    """Inserts an ``insert`` byte after each occurrence of ``after``, so that the preamble stays unique."""
-
-    after: bytes
-    insert: int
-    exempt: tuple[str, ...]
-    #: True: the payload is stuffed first; length and checksum cover the stuffed payload. False: the whole
-    #: frame is stuffed, except the exempt parts.
-    before_checksum: bool = False
-    section: Text = ""
-
-
-@dataclass(frozen=True, slots=True)
 class Silence:
     """An idle line that ends a frame: ``byte_times`` on the bus, but at least ``seconds``.
 
@@ -211,13 +198,14 @@ class Silence:
 class DelimitedFrame:
     """Parts in wire order; a terminator, an idle line alone, a length or the message determines the end.
 
-    ``coding`` applies to the parts named in ``coded``, one coding after the other.
+    ``coding`` applies to the parts named in ``coded``, one coding after the other: to those of the finished
+    frame; or, if ``checked_after``, to the payload alone, whose coded bytes lengths and check values cover.
     """
 
     parts: tuple[Part, ...]
-    stuffing: Stuffing | None = None
     coding: tuple[Coding, ...] = ()
     coded: tuple[str, ...] = ()
+    checked_after: bool = False
     idle: Silence | None = None
     doc: Text = ""
     section: Text = ""
@@ -260,6 +248,13 @@ class DelimitedFrame:
     def tells_end(self) -> bool:
         """Whether something other than the message tells the end of a frame."""
         return self.ends_idle or self.part("length") is not None or self.part("terminator") is not None
+
+    @property
+    def stuffing(self) -> Insert | None:
+        """The byte inserted into a frame that is read from left to right, None without one."""
+        known = self.ends_idle or self.part("terminator") is not None
+        first = self.coding[0] if self.coding and not known else None
+        return first if isinstance(first, Insert) else None
 
     @cached_property
     def paired(self) -> int | None:

@@ -280,18 +280,13 @@ def _delimited(whole: DelimitedFrame, direction: Direction) -> FramePlan:
 
 
 def _transparency(frame: DelimitedFrame) -> Transparency:
-    stuffing = frame.stuffing
-    if frame.coding or frame.part("terminator") or frame.ends_idle:
-        return _coded(frame)
-    if stuffing is None:
+    if not (frame.coding or frame.part("terminator") or frame.ends_idle):
         return Plain()
-    rule = Insertion(stuffing.after, stuffing.insert)
-    if stuffing.before_checksum:
-        return PayloadStuffing(rule)
-    names = [part.name for part in frame.parts]
-    stuffed = [index for index, name in enumerate(names) if name not in stuffing.exempt]
-    front, back = frame.parts[: stuffed[0]], frame.parts[stuffed[-1] + 1 :]
-    return FrameStuffing(rule, sum(part.size for part in front), sum(part.size for part in back))
+    coded = _coded(frame)
+    if frame.stuffing is None:
+        return coded
+    rule = Insertion(frame.stuffing.after, frame.stuffing.insert)
+    return PayloadStuffing(rule) if frame.checked_after else FrameStuffing(rule, coded.front, coded.back)
 
 
 def _coded(frame: DelimitedFrame) -> Coded:

@@ -11,6 +11,7 @@ from qlinkgen.schema.notation import byte_string
 from qlinkgen.schema.parts import PartBuilder
 from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
+from qlinkgen.schema.stuffing import check_end
 
 _PATH: Path = ("frame", "coding")
 #: The key that names a coding, and the keys that complete it.
@@ -40,19 +41,25 @@ class CodingBuilder:
         self._builder = builder
         self._report = report
 
-    def build(self, spec: Codings | None) -> tuple[tuple[Coding, ...], tuple[str, ...]]:
-        """The codings in the order in which they are applied, and the names of the coded parts."""
+    def build(self, spec: Codings | None) -> tuple[tuple[Coding, ...], tuple[str, ...], bool]:
+        """The codings in order, the names of coded parts, and whether check values cover coded bytes."""
         if spec is None:
-            return (), ()
+            return (), (), False
         many = isinstance(spec, list)
         specs = spec if isinstance(spec, list) else [spec]
-        if not self._silent and not any(part.role == "terminator" for part in self._parts):
+        known = self._silent or any(part.role == "terminator" for part in self._parts)
+        if not known:
             self._check_open(specs)
+        after = [index for index, each in enumerate(specs) if each.checked == "after"]
+        for index in after:
+            self._check_after(specs[index], (*_PATH, index) if many else _PATH, known=known)
         codings = [self._coding(each, (*_PATH, index) if many else _PATH) for index, each in enumerate(specs)]
         for index, coding in enumerate(codings[:-1]):
             if isinstance(coding, Cobs):
                 self._error((*_PATH, index), "COBS is followed by another coding", "move cobs to the end")
         coded = self._coded(None, _PATH)
+        if after:
+            coded = tuple(part.name for part in self._parts if part.role == "payload")
         given = [(each.over, index) for index, each in enumerate(specs) if each.over is not None]
         for over, index in given:
             path: Path = (*_PATH, index, "over") if many else (*_PATH, "over")
@@ -61,7 +68,7 @@ class CodingBuilder:
                 self._error(path, what, "name the same parts in each, or only in one")
             else:
                 coded = self._coded(over, path)
-        return tuple(each for each in codings if each is not None), coded
+        return tuple(each for each in codings if each is not None), coded, bool(after)
 
     def _check_open(self, specs: Sequence[CodingSpec]) -> None:
         """Check that a receiver can decode as it reads, since nothing tells the end before."""
@@ -70,13 +77,27 @@ class CodingBuilder:
             wrong = "several codings"
         elif specs[0].cobs is not None:
             wrong = "COBS"
-        elif specs[0].insert is not None:
-            wrong = "insert"
         if wrong:
             what = f"{wrong} cannot be decoded before the end of a frame is known"
-            hint = "write stuffing" if wrong == "insert" else "add a part with role: terminator"
+            hint = "add a part with role: terminator"
             needs = (_PATH, ("frame", "parts"))
             self._report.error("not-applicable", _PATH, what, hint, of_key=True, needs=needs)
+
+    def _check_after(self, spec: CodingSpec, path: Path, *, known: bool) -> None:
+        """Check that check values can cover coded bytes: those of a payload with a length."""
+        place = (*path, "checked")
+        payload = next(part.name for part in self._parts if part.role == "payload")
+        if known:
+            what = "check values of a frame with a terminator or a silence cover the bytes before the coding"
+            self._error(place, what, "remove checked: after")
+        elif spec.insert is None:
+            what = "check values cover only inserted bytes, not those of another coding"
+            self._error(place, what, "remove checked: after")
+        elif spec.over is not None and spec.over != [payload]:
+            what = "lengths and check values cannot cover bytes of themselves"
+            self._error((*path, "over"), what, f"write over: [{payload}]")
+        else:
+            check_end(self._parts, place, self._report)
 
     def _error(self, path: Path, what: str, hint: str) -> None:
         self._report.error("bad-coding", path, what, hint, of_key=True)

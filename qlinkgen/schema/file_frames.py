@@ -215,7 +215,7 @@ Parts = dict[str, Annotated[PartSpec, BeforeValidator(_PartForms.expanded), _Par
 
 
 class StuffingSpec(FileMapping):
-    """Inserts a byte after each occurrence of a pattern."""
+    """Inserts a byte after each occurrence of a pattern; ``coding`` can say the same."""
 
     after: ByteText = Field(description="Pattern after which a byte is inserted")
     insert: ByteText = Field(description="The inserted byte")
@@ -244,6 +244,10 @@ class CodingSpec(FileMapping):
         default=None, description="Each byte is followed by its complement"
     )
     add: ByteText | None = Field(default=None, description="Number added to each byte")
+    checked: Literal["before", "after"] = Field(
+        default="before",
+        description="Lengths and check values cover the bytes before the coding, or the coded bytes after it",
+    )
     over: list[str] | None = Field(
         default=None, description="Coded parts; default: all but the first constant, up to the terminator"
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.frame import ATTRIBUTE, Checksum, DelimitedFrame, Frame, MarkedFrame, PacketFrame, Part
@@ -147,10 +147,13 @@ class FrameBuilder:
         )
         parts = PartConditions(specs, path, self._report).added(parts)
         stuffed, coded_as = (spec.stuffing, spec.coding) if isinstance(spec, FrameSpec) else (None, None)
-        stuffing = build_stuffing(stuffed, parts, self._parts, self._report) if stuffed else None
-        codings = CodingBuilder(parts, self._parts, self._report, silent=bool(silence and silence.alone))
-        coding, coded = codings.build(coded_as)
-        whole = DelimitedFrame(parts, stuffing, coding, coded, silence, spec.doc, spec.section)
+        alone = bool(silence and silence.alone)
+        coding = CodingBuilder(parts, self._parts, self._report, silent=alone).build(coded_as)
+        if stuffed:
+            self._check_stuffing(parts, path, alone=alone, coded=coded_as is not None)
+            insert, names, after = build_stuffing(stuffed, parts, self._parts, self._report)
+            coding = (insert,), names, after
+        whole = DelimitedFrame(parts, *coding, silence, spec.doc, spec.section)
         if not all(self._fits(whole.towards(each), path) for each in whole.ways):
             return None
         if whole.directed:
@@ -171,7 +174,8 @@ class FrameBuilder:
             return False
         self._check_length(frame, path)
         check_conditions(frame, path, self._report)
-        check_unique(frame, self._report)
+        stated = "coding" if self._file.frame.coding is not None else "stuffing"
+        check_unique(frame, ("frame", stated), self._report)
         check_terminator_part(frame, self._report)
         if frame.ends_idle:
             self._check_idle(frame, path)
@@ -187,10 +191,19 @@ class FrameBuilder:
         if not frame.payload.min_size and not any(part.size for part in frame.parts):
             what = "a frame may have no byte, which a receiver cannot tell from silence"
             self._parts.fault("bad-frame", (*path, frame.payload.name), what, "write size: 1..8")
-        if frame.stuffing is not None:
+
+    def _check_stuffing(self, parts: Sequence[Part], path: Path, *, alone: bool, coded: bool) -> None:
+        """Check that the notation of stuffing is not used for another coding, or beside one."""
+        end = next((part.name for part in parts if part.role == "terminator"), "")
+        place, hint = ("frame", "stuffing"), "write coding: {insert: 00, after: A5}"
+        what = "stuffing cannot be combined with a terminator" if end else ""
+        if alone and not end:
             what = "stuffing does not apply to frames that only an idle line ends"
-            hint = "write coding: {insert: 00, after: A5}"
-            self._parts.fault("not-applicable", ("frame", "stuffing"), what, hint)
+        elif coded and not end:
+            what, hint = "coding says the same as stuffing", "remove one of them"
+        if what:
+            needs = ((*path, end),) if end else ()
+            self._report.error("not-applicable", place, what, hint, of_key=True, needs=needs)
 
     def _check_order(self, frame: DelimitedFrame, path: Path) -> None:
         """Check that what determines the end precedes the payload."""
@@ -312,12 +325,7 @@ class FrameBuilder:
                 what = f"{part.name} cannot equal {source.name}"
                 hint = "use a number of the same size that is not derived itself"
                 self._report.error("bad-frame", (*path, part.name, "equals"), what, hint)
-            elif (
-                part.derivation
-                and source.role == "length"
-                and frame.stuffing
-                and frame.stuffing.before_checksum
-            ):
+            elif part.derivation and source.role == "length" and frame.checked_after:
                 what = f"{part.name} cannot repeat a length of stuffed bytes"
                 self._report.error("bad-frame", (*path, part.name, "equals"), what, "stuff the whole frame")
 
@@ -333,7 +341,7 @@ class FrameBuilder:
             return
         self._check_scale(frame, length, path)
         longest = frame.length_bias + frame.payload.max_size
-        if frame.stuffing and frame.stuffing.before_checksum:
+        if frame.stuffing and frame.checked_after:
             longest += frame.payload.max_size // len(frame.stuffing.after)
         longest = -(-longest // length.scale)
         if longest > length.scalar.maximum:
@@ -352,7 +360,7 @@ class FrameBuilder:
             self._report.error(
                 "length-does-not-fit", (*path, length.name, "offset"), what, hint, needs=(path,)
             )
-        if length.scale > 1 and frame.stuffing and frame.stuffing.before_checksum:
+        if length.scale > 1 and frame.checked_after:
             what = "stuffed bytes are not counted in steps"
             hint = "remove scale, or stuff the whole frame"
             self._report.error("bad-frame", (*path, length.name, "scale"), what, hint, needs=(path,))

@@ -1,8 +1,11 @@
-"""Second pass, stuffing: builds the rule, and checks that it keeps the preamble unique."""
+"""Second pass, stuffing: another notation of a coding; checks that a preamble stays unique."""
 
 from __future__ import annotations
 
-from qlinkgen.model.frame import DelimitedFrame, Part, Stuffing
+from collections.abc import Sequence
+
+from qlinkgen.model.coding import Insert
+from qlinkgen.model.frame import DelimitedFrame, Part
 from qlinkgen.schema.file_frames import StuffingSpec
 from qlinkgen.schema.parts import PartBuilder
 from qlinkgen.schema.report import Reporter
@@ -13,8 +16,8 @@ _PATH: Path = ("frame", "stuffing")
 
 def build_stuffing(
     spec: StuffingSpec, parts: tuple[Part, ...], builder: PartBuilder, report: Reporter
-) -> Stuffing:
-    """The stuffing described by the file."""
+) -> tuple[Insert, tuple[str, ...], bool]:
+    """The coding, the names of the coded parts, and whether check values cover the coded bytes."""
     builder.known(spec.exempt, [part.name for part in parts], (*_PATH, "exempt"))
     if len(spec.insert) != 1:
         what = f"{len(spec.insert)} bytes cannot be inserted"
@@ -23,7 +26,7 @@ def build_stuffing(
     after_stuffing = spec.checksum == "after"
     if after_stuffing:
         exempt = _all_but_payload(spec, parts, report)
-        _check_end(parts, report)
+        check_end(parts, (*_PATH, "checksum"), report)
     else:
         _check_middle(exempt, parts, report)
     payload = next(part for part in parts if part.role == "payload")
@@ -36,7 +39,8 @@ def build_stuffing(
             f"remove {payload.name}, or the stuffing",
             needs=((*_PATH, "exempt"),),
         )
-    return Stuffing(spec.after, spec.insert[0], exempt, after_stuffing, spec.section)
+    stuffed = tuple(part.name for part in parts if part.name not in exempt)
+    return Insert(spec.after, spec.insert[0]), stuffed or (payload.name,), after_stuffing
 
 
 def _all_but_payload(spec: StuffingSpec, parts: tuple[Part, ...], report: Reporter) -> tuple[str, ...]:
@@ -50,16 +54,16 @@ def _all_but_payload(spec: StuffingSpec, parts: tuple[Part, ...], report: Report
     return others
 
 
-def _check_end(parts: tuple[Part, ...], report: Reporter) -> None:
+def check_end(parts: Sequence[Part], place: Path, report: Reporter) -> None:
     """Check that a payload stuffed before the checksum has a length and a checksum."""
-    roles, place = [part.role for part in parts], (*_PATH, "checksum")
+    roles = [part.role for part in parts]
     needs = (place, ("frame", "parts"))
     if "checksum" not in roles:
         what, hint = "the frame has no checksum to compute after the stuffing", "remove it, or add a checksum"
         report.error("bad-frame", place, what, hint, needs=needs)
     if "length" not in roles:
         what = "a payload that is stuffed before the checksum has no length to determine its end"
-        hint = "add a length that counts the payload, or remove checksum: after"
+        hint = f"add a length that counts the payload, or remove {place[-1]}: after"
         report.error("no-frame-end", place, what, hint, needs=needs)
 
 
@@ -74,22 +78,22 @@ def _check_middle(exempt: tuple[str, ...], parts: tuple[Part, ...], report: Repo
             report.error("bad-frame", place, what, hint, needs=(place, ("frame", "parts")))
 
 
-def check_unique(frame: DelimitedFrame, report: Reporter) -> None:
+def check_unique(frame: DelimitedFrame, path: Path, report: Reporter) -> None:
     """Warn if the preamble can occur in a stuffed frame."""
     stuffing = frame.stuffing
     if stuffing is None:
         return
-    needs = (_PATH, ("frame", "parts"))
+    needs = (path, ("frame", "parts"))
     if not frame.preamble:
         what, hint = (
             "the frame does not begin with a constant, so stuffing has no use",
             "remove it, or add a preamble",
         )
-        report.error("preamble-not-unique", _PATH, what, hint, of_key=True, needs=needs)
+        report.error("preamble-not-unique", path, what, hint, of_key=True, needs=needs)
     elif not _broken(frame.preamble, stuffing.after, stuffing.insert):
         what = f"the preamble {frame.preamble.hex(' ').upper()} can occur inside a frame despite the stuffing"
         hint = "use a part of the preamble for after, and insert a byte that does not follow it there"
-        report.error("preamble-not-unique", _PATH, what, hint, of_key=True, needs=needs)
+        report.error("preamble-not-unique", path, what, hint, of_key=True, needs=needs)
 
 
 def _broken(preamble: bytes, after: bytes, insert: int) -> bool:

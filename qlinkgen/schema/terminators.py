@@ -26,10 +26,6 @@ def check_terminator_part(frame: DelimitedFrame, report: Reporter) -> None:
     if names.index(end.name) < names.index(frame.payload.name):
         what = f"{end.name} precedes the payload"
         report.error("bad-frame", place, what, "move it after the payload", of_key=True)
-    if frame.stuffing is not None:
-        what = "stuffing cannot be combined with a terminator"
-        hint = "write coding: {insert: 00, after: A5}"
-        report.error("not-applicable", ("frame", "stuffing"), what, hint, of_key=True, needs=(place,))
     if not end.shared:
         return
     if frame.parts[0].constant != end.constant:

@@ -9,7 +9,8 @@ import pytest
 from pydantic import BaseModel
 
 from qlinkgen.errors import SchemaError
-from qlinkgen.model.frame import DelimitedFrame, Stuffing
+from qlinkgen.model.coding import Insert
+from qlinkgen.model.frame import DelimitedFrame
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Blob
 from qlinkgen.schema import file_commands, file_fields, file_frames, load
@@ -44,7 +45,7 @@ def frame(protocol: Protocol) -> DelimitedFrame:
     return protocol.frame
 
 
-def stuffing(protocol: Protocol) -> Stuffing:
+def stuffing(protocol: Protocol) -> Insert:
     found = frame(protocol).stuffing
     assert found is not None
     return found

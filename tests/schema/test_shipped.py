@@ -209,8 +209,9 @@ def test_qlink_frame(qlink: Protocol) -> None:
     assert [chunk.shift for chunk in crc.chunks] == [8, 0], "high byte first"
     assert not crc.confirmed
     assert frame.stuffing
-    assert (frame.stuffing.after, frame.stuffing.insert, frame.stuffing.exempt) == (b"\xa5", 0, ("preamble",))
-    assert not frame.stuffing.before_checksum
+    assert (frame.stuffing.after, frame.stuffing.insert) == (b"\xa5", 0)
+    assert {part.name for part in frame.parts} - {*frame.coded} == {"preamble"}
+    assert not frame.checked_after
 
 
 def test_qlink_worst_wire_size(qlink: Protocol) -> None:

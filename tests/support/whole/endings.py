@@ -42,6 +42,17 @@ def openly(rng: random.Random, frame: Doc) -> None:
     frame["coding"] = coding
 
 
+def as_coding(frame: Doc) -> None:
+    """Write a stuffing as a coding."""
+    stuffing = frame.pop("stuffing")
+    frame["coding"] = {"insert": stuffing["insert"], "after": stuffing["after"]}
+    if stuffing.get("checksum") == "after":
+        frame["coding"]["checked"] = "after"
+        return
+    names = [name for name, spec in frame["parts"].items() if spec.get("role") != "idle"]
+    frame["coding"]["over"] = [name for name in names if name not in stuffing.get("exempt", ())]
+
+
 def silence(rng: random.Random, parts: Doc) -> None:
     """Let only an idle line end the frame: without terminator and length."""
     gone = [name for name, spec in parts.items() if spec.get("role") in ("terminator", "length")]

@@ -129,6 +129,8 @@ def _end(rng: random.Random, more: random.Random, shape: Shape, kind: str) -> No
         endings.silence(more, shape.frame["parts"])
     elif kind in ("parts", "mixed") and _codes(shape.frame) and more.random() < 0.2:
         endings.openly(more, shape.frame)
+    if "stuffing" in shape.frame and more.random() < 0.3:
+        endings.as_coding(shape.frame)
 
 
 def _codes(frame: Doc) -> bool:

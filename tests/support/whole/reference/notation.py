@@ -68,7 +68,25 @@ def load(text: str) -> Doc:
         name for name, spec in parts.items() if isinstance(spec, dict) and spec.get("role") == "idle"
     ]:
         document["frame"]["silent"] = parts.pop(name).get("alone", False)
+    _stuffed(document.get("frame", {}), parts)
     return document
+
+
+def _stuffed(frame: Doc, parts: Doc) -> None:
+    """Write the insertion into a frame that is read from left to right as stuffing."""
+    coding = frame.get("coding")
+    ended = any(isinstance(spec, dict) and spec.get("role") == "terminator" for spec in parts.values())
+    if not isinstance(coding, dict) or "insert" not in coding or ended or frame.get("silent"):
+        return
+    del frame["coding"]
+    first = next(iter(parts))
+    constant = not isinstance(parts[first], dict) or {"value", "text"} & parts[first].keys()
+    over = coding.get("over", list(parts)[int(bool(constant)) :])
+    frame["stuffing"] = {"after": coding["after"], "insert": coding["insert"]}
+    if coding.get("checked") == "after":
+        frame["stuffing"]["checksum"] = "after"
+    else:
+        frame["stuffing"]["exempt"] = [name for name in parts if name not in over]
 
 
 def exact(given: object) -> Fraction:
