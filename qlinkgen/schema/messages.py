@@ -279,10 +279,7 @@ class MessageBuilder:
         self._check_size(message, path)
         if message.separator:
             check_separator(message, self._frame, path, self._report)
-        if message.empty_is_default and any(f.conditional or f.terminated for f in message.fields):
-            why = (
-                "fields that may be absent" if any(f.conditional for f in message.fields) else "a terminator"
-            )
+        if message.empty_is_default and (why := _why_not_empty(message)):
             what = f"{message.name} has {why}, so an empty one is not all its defaults"
             self._error("bad-condition", (*path[:-1], "empty_request"), what, "remove empty_request")
         if isinstance(self._frame, DelimitedFrame) and self._frame.payload.trim is not None:
@@ -431,3 +428,12 @@ def _joined(ranges: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
         else:
             joined.append((first, last))
     return tuple(joined)
+
+
+def _why_not_empty(message: Message) -> str:
+    """What a message has so that an empty payload is not all its defaults, "" if nothing."""
+    if any(field.conditional for field in message.fields):
+        return "fields that may be absent"
+    if any(field.terminated for field in message.fields):
+        return "a terminator"
+    return "records of variable size" if any(field.walked for field in message.fields) else ""
