@@ -31,7 +31,9 @@ from qlinkgen.plan.payload import (
     ItemsStep,
     PayloadPlan,
     RecordsStep,
+    RecordStep,
     Step,
+    full_size,
     least_size,
     term_of,
 )
@@ -157,6 +159,8 @@ def _bytes(step: Step, payload: PayloadPlan) -> str:
     """Return the size of a step in bytes."""
     if payload.separator and isinstance(step, TextStep):
         return span_text(*characters(step))
+    if isinstance(step, RecordStep | RecordsStep) and step.walked:
+        return span_text(least_size(step), full_size(step))
     if isinstance(step, BytesStep | ItemsStep | RecordsStep) and not step.fixed:
         return term_text(term_of(step))
     return str(least_size(step))

@@ -196,10 +196,14 @@ def _filled(step: FilledStep, data: bytes, counts: Mapping[str, int]) -> bytes:
 
 def _sizes(plan: PayloadPlan, values: Mapping[str, Raw]) -> dict[str, dict[str, int]]:
     """What counts of bytes of walked records count, by the name of the count and of the records."""
-    runs = {each.run for each in plan.steps if isinstance(each, CountStep) and each.sized}
-    sizes = {name: len(_packed(plan.run(name), values, {})) for name in runs if values[name] is not None}
     counts = [each for each in plan.steps if isinstance(each, CountStep) and each.sized]
-    return {each.name: {each.run: sizes.get(each.run, 0)} for each in counts}
+    sizes: dict[str, int] = {}
+    for each in counts:
+        steps = [segment.steps[0] for segment in plan.counted(each.run)]
+        sizes[each.run] = sum(
+            len(_packed(step, values, {})) for step in steps if values[step.name] is not None
+        )
+    return {each.name: {each.run: sizes[each.run]} for each in counts}
 
 
 def default_of(each: Holder) -> Raw:
@@ -365,20 +369,19 @@ def _unpack_walked(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
     values = _Values()
     try:
         for each in visit(plan, payload):
-            own = values.of(each.inside)
-            if each.walked and each.data is not None:
-                own.setdefault(each.step.name, [])  # an array without records
-            elif isinstance(each.step, FilledStep):
+            own, name = values.of(each.inside), value_name(each.step)
+            if isinstance(each.step, FilledStep):
                 _verify_at(each, each.step, payload)
             elif each.data is None:
-                own |= {holder.name: None for holder in holders((each.step,))}
+                for holder in holders((each.step,)):
+                    own.setdefault(value_name(holder), None)
+            elif each.walked:
+                own[name] = [] if own.get(name) is None else own[name]  # an array without records
             else:
                 own |= _unpacked_at(each, each.data)
     except Wrong as wrong:
-        raise BadContent("length", _public(plan, wrong.path), wrong.at) from None
-    except BadContent as bad:
-        raise BadContent(bad.kind, _public(plan, bad.field), bad.offset) from None
-    return by_value(plan, values.of(()))
+        raise BadContent("length", wrong.path, wrong.at) from None
+    return values.of(())
 
 
 class _Values:
@@ -409,8 +412,9 @@ def _verify_at(visit: walk.Visit, step: FilledStep, payload: bytes) -> None:
 
 
 def _unpacked_at(visit: walk.Visit, data: bytes) -> dict[str, Raw]:
+    step = replace(visit.step, name=value_name(visit.step))
     try:
-        return _unpacked(visit.step, data, _counts_of(visit.step, data), visit.at)
+        return _unpacked(step, data, _counts_of(step, data), visit.at)
     except BadContent as bad:
         raise BadContent(bad.kind, visit.prefix + bad.field, bad.offset) from None
 

@@ -328,7 +328,8 @@ def count_unit(step: CountStep) -> str:
     """The unit of a count."""
     if step.unit > 1:
         return f"units of {step.unit} bytes"
-    return "bytes" if step.term.packed or step.term.factor > 1 or step.term.more > 0 else "items"
+    term = step.term
+    return "bytes" if step.sized or term.packed or term.factor > 1 or term.more > 0 else "items"
 
 
 def counted_text(step: CountStep) -> str:
@@ -636,7 +637,9 @@ def segment_text(segment: Segment) -> str:
     """A segment of a walked payload: its fields, its size, and what decides whether it is present."""
     names = ", ".join(step.name for step in segment.steps)
     run = segment.run
-    if run is None:
+    if segment.records is not None:
+        size = "read one by one" if isinstance(segment.records, RecordsStep) else "one"
+    elif run is None:
         size = f"{segment.size} bytes" if segment.size != 1 else "1 byte"
     else:
         size = f"{run.item_size}*{run.name}" if run.item_size > 1 else run.name
@@ -644,4 +647,5 @@ def segment_text(segment: Segment) -> str:
         if segment.rest is not None:
             rest = size_text(segment.rest)
             size = f"the rest{f' but {rest} bytes' if rest != '0' else ''}"
+            size = f"the bytes of {segment.slot}" if segment.counted else size
     return f"{names}: {size}" + (f", {presence_text(segment.presence)}" if segment.presence else "")

@@ -17,6 +17,7 @@ from qlinkgen.plan.payload import (
     RecordStep,
     ValueStep,
 )
+from qlinkgen.plan.walk import of_values
 
 
 def native_of(step: Holder, raw: Raw) -> Native:
@@ -47,4 +48,4 @@ def native_of(step: Holder, raw: Raw) -> Native:
 
 def _record(plan: PayloadPlan, raw: Raw) -> Mapping[str, Native]:
     assert isinstance(raw, Mapping)
-    return {each.name: native_of(each, raw[each.name]) for each in plan.settable}
+    return {name: native_of(each, value) for name, (each, value) in of_values(plan, raw).items()}

@@ -132,7 +132,7 @@ class CountStep:
     term: Term
     bounds: Within
     presence: Presence | None = None
-    #: It tells the bytes of records of variable size, not their number.
+    #: It tells the bytes of records of variable size, not their number, or those of the choice ``run``.
     sized: bool = False
     #: Bytes or items that it counts as one.
     unit: int = 1
@@ -413,18 +413,25 @@ class Segment:
         presence: what decides whether it is present, None if it always is.
         size: its size if it is present, None for a run of variable size and for walked records.
         rest: size of what follows a run that takes the rest of the payload, None for other segments.
+        counted: it is a case of a choice whose bytes a count tells, which it fills.
     """
 
     steps: tuple[Step, ...]
     presence: Presence | None
     size: int | None
     rest: Size | None = None
+    counted: bool = False
 
     @property
     def terminator(self) -> bytes:
         """The character that ends its text, b"" for other segments."""
         run = self.run
         return run.terminator if isinstance(run, BytesStep) else b""
+
+    @property
+    def slot(self) -> str:
+        """The value of which it is a case, "" for other segments."""
+        return self.presence.slot if self.presence else ""
 
     @property
     def run(self) -> RunStep | None:
@@ -437,6 +444,22 @@ class Segment:
         """The walked records, None for other segments."""
         step = self.steps[0] if len(self.steps) == 1 else None
         return step if isinstance(step, RecordStep | RecordsStep) and step.walked else None
+
+
+def deciding(segments: Iterable[Segment]) -> tuple[Test, ...]:
+    """The tests of values that the size of segments depends on; a count tells that of some choices."""
+    return tuple(
+        test for each in segments if each.presence and not each.counted for test in each.presence.when
+    )
+
+
+def by_choice(segments: Iterable[Segment]) -> tuple[tuple[Segment, tuple[Segment, ...]], ...]:
+    """The segments; those of the cases of a choice once, with the first of them, () for others."""
+    found: list[tuple[Segment, tuple[Segment, ...]]] = []
+    for slot, group in groupby(segments, lambda each: each.slot):
+        own = tuple(group)
+        found += [(own[0], own)] if slot else [(each, ()) for each in own]
+    return tuple(found)
 
 
 # Numbers of items -------------------------------------------------------------------------------------------
@@ -515,11 +538,7 @@ class PayloadPlan:
     @property
     def by_choice(self) -> tuple[tuple[Segment, tuple[Segment, ...]], ...]:
         """The segments; those of the cases of a choice once, with the first of them, () for others."""
-        found: list[tuple[Segment, tuple[Segment, ...]]] = []
-        for slot, group in groupby(self.segments, lambda each: each.presence.slot if each.presence else ""):
-            own = tuple(group)
-            found += [(own[0], own)] if slot else [(each, ()) for each in own]
-        return tuple(found)
+        return by_choice(self.segments)
 
     @property
     def fixed(self) -> bool:
@@ -549,6 +568,10 @@ class PayloadPlan:
         ]
         most = min([run.length.maximum, *(_countable(each) for each in counts)])
         return Within(run.length.minimum, most)
+
+    def counted(self, name: str) -> tuple[Segment, ...]:
+        """The segments of what a count tells the bytes of: records, or the cases of a choice."""
+        return tuple(each for each in self.segments if name in (each.slot, each.steps[0].name))
 
     def run(self, name: str) -> RunStep:
         """The run with a name, of fixed or variable size."""
@@ -623,6 +646,8 @@ def full_size(step: Step) -> int:
     """Size of a step of constant size, if it is present; the maximum of walked records."""
     if isinstance(step, RecordsStep) and step.walked:
         return step.length.maximum * step.record.payload.most
+    if isinstance(step, RecordStep) and step.walked:
+        return step.record.payload.most
     return term_of(step).value(step.length.maximum) if isinstance(step, RunStep) else least_size(step)
 
 
@@ -700,7 +725,7 @@ def renamed(segments: Iterable[Segment], suffix: str) -> tuple[Segment, ...]:
         replace(
             each,
             steps=tuple(_renamed(step, suffix) for step in each.steps),
-            presence=each.presence and replace(each.presence, when=renamed_tests(each.presence.when, suffix)),
+            presence=each.presence and _renamed_presence(each.presence, suffix),
         )
         for each in segments
     )
@@ -709,6 +734,11 @@ def renamed(segments: Iterable[Segment], suffix: str) -> tuple[Segment, ...]:
 def renamed_tests(tests: Iterable[Test], suffix: str) -> tuple[Test, ...]:
     """Tests of steps that have a suffix."""
     return tuple(replace(test, value=test.value + suffix) for test in tests)
+
+
+def _renamed_presence(presence: Presence, suffix: str) -> Presence:
+    slot = presence.slot and presence.slot + suffix
+    return replace(presence, when=renamed_tests(presence.when, suffix), slot=slot)
 
 
 def _renamed(step: Step, suffix: str) -> Step:

@@ -144,16 +144,19 @@ class _Planner:
         presence = _presence(field)
         step = _present(self._step(field, Place(Size(), None)), presence)
         kind = field.type
+        counted = bool(field.slot) and any(_counts(each) == field.slot for each in self._all)
         if isinstance(kind, Record) and field.walked:
-            return Segment((step,), presence, None)
+            return Segment((step,), presence, None, counted=counted)
         if not isinstance(kind, Blob | Array | Records) or (kind.length.fixed and not field.walked):
-            return Segment((step,), presence, field.max_size)
+            return Segment((step,), presence, field.max_size, counted=counted)
         if field.terminated:
-            return Segment((step,), presence, None)
+            return Segment((step,), presence, None, counted=counted)
+        if counted and not (isinstance(kind, Records) and (kind.last or kind.length.fixed)):
+            return Segment((step,), presence, None, Size(), counted=True)
         # A field after the rest that may be absent is absent where the rest is present.
         always = tuple(each for each in after if not each.conditional)
         ends = kind.length.counted_by or kind.length.fixed or (isinstance(kind, Records) and kind.last)
-        return Segment((step,), presence, None, None if ends else _size_of(always))
+        return Segment((step,), presence, None, None if ends else _size_of(always), counted=counted)
 
     def _step(self, field: Field, place: Place) -> Step:
         kind = field.type
@@ -196,6 +199,8 @@ class _Planner:
                 return ConstantStep(name, place, scalar.integer, scalar.default, scalar, accepted=accepted)
             case Reserved():
                 return ReservedStep(name, place, scalar.integer, scalar.default, scalar)
+            case Count(run, _, beside) if run not in self._fields:
+                return self._choice_count(name, scalar, place, run, beside)
             case Count(run, unit, beside, scale, offset):
                 counted = self._fields[run].type
                 assert isinstance(counted, Blob | Array | Records)
@@ -228,6 +233,16 @@ class _Planner:
         begin, end = self._spans[first][0], self._spans[last][1]
         return FilledStep(name, place, scalar.integer, begin, end, covered, rule)
 
+    def _choice_count(
+        self, name: str, scalar: Scalar, place: Place, slot: str, beside: tuple[str, ...]
+    ) -> CountStep:
+        """A count of the bytes of a choice."""
+        more = sum(self._fields[each].max_size for each in beside)
+        most = greatest_size(each for each in self._all if each.slot == slot)
+        most = most if self._limit is None else min(most, self._limit)
+        bounds = Within(more, min(scalar.integer.maximum, more + most))
+        return CountStep(name, place, scalar.integer, slot, Term(slot, 1, more=more), bounds, sized=True)
+
     def _sizing(self, steps: list[Step], size: Size) -> Iterator[Sizing]:
         """In wire order: the count of a run precedes it, and lint rejects a count after an uncounted run."""
         for step in steps:
@@ -249,6 +264,12 @@ class _Planner:
         kind = self._fields[run].type
         assert isinstance(kind, Blob | Array | Records)
         return kind.length
+
+
+def _counts(field: Field) -> str:
+    """What a field counts, "" if it is not a count."""
+    kind = field.type
+    return kind.role.run if isinstance(kind, Scalar) and isinstance(kind.role, Count) else ""
 
 
 def _size_of(fields: Iterable[Field]) -> Size:

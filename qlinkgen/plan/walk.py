@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Generator, Iterator, Mapping
 from dataclasses import dataclass
-from typing import assert_never
+from typing import TypeVar, assert_never
 
 from qlinkgen.model.condition import Test
 from qlinkgen.plan.expr import Size
@@ -19,6 +19,7 @@ from qlinkgen.plan.payload import (
     ConstantStep,
     CountStep,
     FilledStep,
+    Holder,
     ItemsStep,
     PayloadPlan,
     Presence,
@@ -28,8 +29,13 @@ from qlinkgen.plan.payload import (
     Segment,
     Step,
     ValueStep,
+    by_choice,
+    deciding,
     full_size,
+    value_name,
 )
+
+T = TypeVar("T")
 
 
 class Wrong(ValueError):
@@ -74,6 +80,20 @@ def present(presence: Presence | None, numbers: Mapping[str, int], left: int) ->
     return all(test.holds(numbers[test.value]) for test in presence.when)
 
 
+def of_values(plan: PayloadPlan, values: Mapping[str, T]) -> dict[str, tuple[Holder, T]]:
+    """The raw values of a payload, each with its step or member; of a choice the case that is present.
+
+    Of a choice without a case that is present, the first one.
+    """
+    numbers = {name: value for name, value in values.items() if isinstance(value, int)}
+    found: dict[str, tuple[Holder, T]] = {}
+    for each in plan.settable:
+        name, presence = value_name(each), each.presence
+        if name not in found or (presence and present(presence, numbers, 0)):
+            found[name] = (each, values[name])
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class Extent:
     """What is known of walked records before they are read.
@@ -97,9 +117,15 @@ class Walk:
         counts: numbers of items of runs, as far as they have counts.
     """
 
-    def __init__(self, segments: Collection[Segment], last: Collection[Test] = ()) -> None:
-        """Begin at the first segment; ``last`` tests values of the record."""
+    def __init__(
+        self, segments: Collection[Segment], last: Collection[Test] = (), *, measuring: bool = False
+    ) -> None:
+        """Begin at the first segment; ``last`` tests values of the record.
+
+        ``measuring``: sizes alone matter.
+        """
         tests = [test for each in segments if each.presence for test in each.presence.when]
+        tests = list(deciding(segments)) if measuring else tests
         self._tested = {test.value for test in (*tests, *last)}
         self._last = tuple(last)
         self._sizes: dict[str, int] = {}
@@ -108,9 +134,10 @@ class Walk:
 
     def size(self, segment: Segment, at: int, left: int) -> int:
         """The size of a segment that is present at ``at`` before ``left`` bytes. Raises Wrong."""
+        name = value_name(segment.steps[0])
         if segment.size is not None:
             if left < segment.size:
-                raise Wrong(segment.steps[0].name, at, segment.steps)
+                raise Wrong(name, at, segment.steps)
             return segment.size
         run = segment.run
         assert run is not None
@@ -119,13 +146,20 @@ class Walk:
         if segment.rest is None:
             size = self.counts[run.name] * run.item_size
             if left < size:
-                raise Wrong(run.name, at, segment.steps)
+                raise Wrong(name, at, segment.steps)
             return size
         size = left - segment.rest.value(self.counts)
         count, odd = divmod(size, run.item_size)
         if odd or not run.length.minimum <= count <= run.length.maximum:
-            raise Wrong(run.name, at, segment.steps)
+            raise Wrong(name, at, segment.steps)
         return size
+
+    def end(self, slot: str, at: int, end: int) -> int:
+        """The offset of the end of a choice whose bytes a count tells. Raises Wrong."""
+        limit = at + self._sizes[slot]
+        if limit > end:
+            raise Wrong(slot, at)
+        return limit
 
     def extent(self, segment: Segment, step: RecordStep | RecordsStep, at: int, end: int) -> Extent:
         """What is known of walked records at ``at`` before they are read. Raises Wrong."""
@@ -138,7 +172,7 @@ class Walk:
             return Extent(number, end, exact=False)
         limit = at + size if size is not None else end - (segment.rest or Size()).value(self.counts)
         if not at <= limit <= end:
-            raise Wrong(step.name, at)
+            raise Wrong(value_name(step), at)
         return Extent(number, limit, exact=True)
 
     @property
@@ -247,13 +281,13 @@ def visit(plan: PayloadPlan, payload: bytes) -> Iterator[Visit]:
         raise Wrong("", at)
 
 
-def _terminated(segment: Segment, payload: bytes, at: int) -> int:
-    """The size of a text with its terminator. Raises Wrong."""
+def _terminated(segment: Segment, payload: bytes, at: int, end: int) -> int:
+    """The size of a text with its terminator, which is before ``end``. Raises Wrong."""
     run = segment.run
     assert run is not None
-    count = payload[at : at + run.length.maximum + 1].find(segment.terminator)
+    count = payload[at : min(end, at + run.length.maximum + 1)].find(segment.terminator)
     if count < run.length.minimum:
-        raise Wrong(run.name, at, segment.steps)
+        raise Wrong(value_name(run), at, segment.steps)
     return count + 1
 
 
@@ -270,33 +304,43 @@ class _Visitor:
 
     def fields(self, segments: Collection[Segment], walk: Walk, at: int, end: int) -> _Visits:
         """The steps of a message or record that begins at ``at`` and ends at ``end`` at the latest."""
-        for segment in segments:
-            if not present(segment.presence, walk.numbers, end - at):
-                yield from (Visit(step, at, None, self._inside) for step in segment.steps)
+        for segment, cases in by_choice(segments):
+            if not segment.counted:
+                for each in cases or (segment,):
+                    at = yield from self._segment(each, walk, at, end)
                 continue
-            if segment.records is not None:
-                at = yield from self._records(segment, segment.records, walk, at, end)
-                continue
-            if segment.terminator:
-                size = _terminated(segment, self._payload, at)
-            else:
-                size = walk.size(segment, at, end - at)
-            for step in segment.steps:
-                begin = at + step.place.front.fixed
-                data = self._payload[begin : begin + (size if segment.size is None else full_size(step))]
-                yield Visit(step, begin, data, self._inside)
-                walk.learn(step, data, begin)
-            at += size
+            limit = walk.end(segment.slot, at, end)
+            for each in cases:
+                at = yield from self._segment(each, walk, at, limit)
+            if at != limit:
+                raise Wrong(segment.slot, at)
         return at
+
+    def _segment(self, segment: Segment, walk: Walk, at: int, end: int) -> _Visits:
+        if not present(segment.presence, walk.numbers, end - at):
+            yield from (Visit(step, at, None, self._inside) for step in segment.steps)
+            return at
+        if segment.records is not None:
+            return (yield from self._records(segment, segment.records, walk, at, end))
+        if segment.terminator:
+            size = _terminated(segment, self._payload, at, end)
+        else:
+            size = walk.size(segment, at, end - at)
+        for step in segment.steps:
+            begin = at + step.place.front.fixed
+            data = self._payload[begin : begin + (size if segment.size is None else full_size(step))]
+            yield Visit(step, begin, data, self._inside)
+            walk.learn(step, data, begin)
+        return at + size
 
     def _records(self, segment: Segment, step: Walkable, walk: Walk, at: int, end: int) -> _Visits:
         begin, index, ended = at, 0, False
         extent = walk.extent(segment, step, at, end)
         while not ended and (at < extent.limit if extent.number is None else index < extent.number):
             if isinstance(step, RecordsStep) and index == step.length.maximum:
-                raise Wrong(step.name, at)
+                raise Wrong(value_name(step), at)
             own = Walk(step.record.segments, step.last if isinstance(step, RecordsStep) else ())
-            place = (step.name, index if isinstance(step, RecordsStep) else None)
+            place = (value_name(step), index if isinstance(step, RecordsStep) else None)
             self._inside = (*self._inside, place)
             try:
                 at = yield from self.fields(step.record.segments, own, at, extent.limit)
@@ -308,34 +352,41 @@ class _Visitor:
         if isinstance(step, RecordsStep) and (
             index < step.length.minimum or (extent.exact and at != extent.limit) or ended != bool(step.last)
         ):
-            raise Wrong(step.name, at)
+            raise Wrong(value_name(step), at)
         yield Visit(step, begin, self._payload[begin:at], self._inside)
         return at
 
 
 def measure(plan: PayloadPlan, start: bytes) -> int:
     """The size of the payload that begins with ``start``. Raises Missing, or Wrong for a wrong count."""
-    return _measured(plan.segments, Walk(plan.segments), start, 0)
+    return _measured(plan.segments, Walk(plan.segments, measuring=True), start, 0)
 
 
 def _measured(segments: Collection[Segment], walk: Walk, start: bytes, at: int) -> int:
     """The offset of the end of a message or record that begins at ``at``."""
-    for segment in segments:
-        if not present(segment.presence, walk.numbers, 1):
+    for segment, cases in by_choice(segments):
+        if segment.counted:
+            at = walk.end(segment.slot, at, 1 << 32)
             continue
-        if segment.records is not None:
-            at = _measured_records(segment, segment.records, walk, start, at)
-            continue
-        for step in segment.steps:
-            if walk.decides(step):
-                assert isinstance(step, ValueStep | BitsStep | CountStep)
-                begin = at + step.place.front.fixed
-                end = begin + step.integer.size
-                if len(start) < end:
-                    raise Missing(end)
-                walk.learn(step, start[begin:end], begin)
-        at += walk.size(segment, at, 1 << 32)
+        for each in cases or (segment,):
+            at = _measured_segment(each, walk, start, at)
     return at
+
+
+def _measured_segment(segment: Segment, walk: Walk, start: bytes, at: int) -> int:
+    if not present(segment.presence, walk.numbers, 1):
+        return at
+    if segment.records is not None:
+        return _measured_records(segment, segment.records, walk, start, at)
+    for step in segment.steps:
+        if walk.decides(step):
+            assert isinstance(step, ValueStep | BitsStep | CountStep)
+            begin = at + step.place.front.fixed
+            end = begin + step.integer.size
+            if len(start) < end:
+                raise Missing(end)
+            walk.learn(step, start[begin:end], begin)
+    return at + walk.size(segment, at, 1 << 32)
 
 
 def _measured_records(segment: Segment, step: Walkable, walk: Walk, start: bytes, at: int) -> int:
@@ -343,7 +394,8 @@ def _measured_records(segment: Segment, step: Walkable, walk: Walk, start: bytes
     if extent.exact:
         return extent.limit
     for _ in range(extent.number or 0):
-        own = Walk(step.record.segments, step.last if isinstance(step, RecordsStep) else ())
+        last = step.last if isinstance(step, RecordsStep) else ()
+        own = Walk(step.record.segments, last, measuring=True)
         at = _measured(step.record.segments, own, start, at)
         if own.last:
             return at

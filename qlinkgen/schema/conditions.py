@@ -168,8 +168,8 @@ class ConditionBuilder:
         after = fields[fields.index(field) + 1 :]
         if field.optional:
             self._check_optional(field, after)
-        counts = [each for each in fields if _counts(each) == field.name]
-        for count in counts:
+        counts = [each for each in fields if _counts(each) in (field.name, field.slot or field.name)]
+        for count in () if field.slot else counts:
             if count.when != field.when or field.optional:
                 what = f"{count.name} counts {field.name}, but one may be absent where the other is not"
                 self._error(
@@ -179,10 +179,9 @@ class ConditionBuilder:
             return
         crossing = (each for each in after if each.conditional and not exclusive(field.when, each.when))
         if not field.optional and (later := next(crossing, None)):
-            what = f"{field.name} takes the rest of the payload, but {later.name} after it may be absent"
-            self._error(
-                later.name, "optional" if later.optional else "if", what, f"give {field.name} a count"
-            )
+            name = field.slot or field.name
+            what = f"{name} takes the rest of the payload, but {later.name} after it may be absent"
+            self._error(later.name, "optional" if later.optional else "if", what, f"give {name} a count")
 
     def _check_optional(self, field: Field, after: Sequence[Field]) -> None:
         if field.when:

@@ -1,7 +1,7 @@
 """Second pass, counts over several fields: ``counts: [kind, size, value]`` is the number of their bytes.
 
-One of them has a variable size, which the count tells; the others have a constant one. The count may be one
-of them itself.
+One of them has a variable size, which the count tells, or is a choice; the others have a constant one. The
+count may be one of them itself.
 """
 
 from __future__ import annotations
@@ -24,10 +24,13 @@ def with_beside(fields: Sequence[Field], specs: Fields, path: Path, report: Repo
 
 def _resolved(field: Field, fields: Sequence[Field], specs: Fields, path: Path, report: Reporter) -> Field:
     kind = field.type
-    if not isinstance(kind, Scalar) or not isinstance(kind.role, Count) or not kind.role.beside:
+    if not isinstance(kind, Scalar) or not isinstance(kind.role, Count):
+        return field
+    choices = {each.slot for each in fields if each.slot}
+    if not kind.role.beside and kind.role.run not in choices:
         return field
     names, known = (kind.role.run, *kind.role.beside), {each.name: each for each in fields}
-    varying = [name for name in names if name in known and not known[name].fixed]
+    varying = [name for name in names if name in choices or (name in known and not known[name].fixed)]
     if fault := _fault(names, varying, known, specs):
         place = (*path, field.name)
         needs = (place, *((*path, name) for name in names))
@@ -39,10 +42,15 @@ def _resolved(field: Field, fields: Sequence[Field], specs: Fields, path: Path, 
     return replace(field, type=replace(kind, role=role))
 
 
-def of_choice(name: str) -> tuple[str, str]:
-    """Error and fix for a count of a choice."""
-    hint = "put a number into each case, as {size: {type: u8, const: 4}, value: u32}"
-    return f"{name} is a choice, whose size follows from its case", hint
+def choice_fault(field: Field, count: Count) -> tuple[str, str] | None:
+    """Error and fix for a count of the bytes of a choice, None if it is right."""
+    if field.conditional:
+        what = f"{field.name} may be absent, so that it does not tell the size of {count.run}"
+        return what, "remove its if"
+    if (count.scale, count.offset) != (1, 0):
+        what = f"the bytes of {count.run}, whose size varies with its case, are counted one by one"
+        return what, "remove scale and offset"
+    return None
 
 
 def scale_fault(count: Count, target: Field, unit: str, beside: int) -> tuple[str, str] | None:
@@ -70,12 +78,10 @@ def _fault(
 ) -> tuple[str, str] | None:
     """Error and fix for what a count names, None if it is right."""
     for name in names:
-        if any(each.slot == name for each in known.values()):
-            return of_choice(name)
-        if name not in known:
+        if name not in known and name not in varying:
             hint = did_you_mean(name, known, f"the fields are {listed(known)}")
             return f"{shown(name)} is not a field that it can count", hint
-        if known[name].terminated:
+        if name in known and known[name].terminated:
             what = f"{name} has a terminator, which tells its size"
             return what, "count other fields, or remove the terminator"
         if names.count(name) > 1:

@@ -10,7 +10,7 @@ from qlinkgen.model.fields import Field, FieldType, Record, Records, greatest_si
 from qlinkgen.model.types import Array, Blob, Count, Scalar
 from qlinkgen.schema.conditions import ConditionBuilder
 from qlinkgen.schema.counted import with_counts
-from qlinkgen.schema.counting import of_choice, scale_fault, with_beside
+from qlinkgen.schema.counting import choice_fault, scale_fault, with_beside
 from qlinkgen.schema.file_fields import Fields, FieldSpec, RecordSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.filled import FilledBuilder
@@ -61,7 +61,6 @@ class FieldBuilder:
         fields = FilledBuilder(specs, path, self._report).build(fields)
         if not separated:
             self._check_open_ends(fields, path)
-        self._check_mixed(fields, path)
         return tuple(self._bounded(fields, path, separators=len(fields) - 1 if separated else 0))
 
     def _check_text(self, kind: FieldType, path: Path) -> None:
@@ -105,7 +104,7 @@ class FieldBuilder:
             if isinstance(field.type, Scalar) and isinstance(count := field.type.role, Count):
                 place = (*path, field.name, "counts")
                 if self._check_count(field, field.type, count, fields, place):
-                    row = next(each.type for each in fields if each.name == count.run)
+                    row = next(each.type for each in fields if count.run in (each.name, each.slot))
                     if count.unit != "bytes" or count.run in counters or not _is_row(row):
                         pass
                     elif count.run in asked:
@@ -117,7 +116,7 @@ class FieldBuilder:
                             "bad-count", place, what, hint, needs=(place[:-1], (*path, count.run))
                         )
                     counters.setdefault(count.run, field.name)
-        return [_with_counter(field, counters.get(field.name)) for field in fields]
+        return [_with_counter(field, counters.get(field.slot or field.name)) for field in fields]
 
     def _whole(self, fields: Sequence[Field], name: str, path: Path) -> Sequence[Field]:
         """The fields; a row whose bytes alone are counted may have as many items as fit them."""
@@ -138,9 +137,9 @@ class FieldBuilder:
         target = later.get(count.run)
         needs = (path[:-1], (*path[:-2], count.run))
         if any(each.slot == count.run for each in later.values()):
-            self._report.error("bad-count", path, *of_choice(count.run), needs=needs)
-            self._report.taint(path)
-            return False
+            if fault := choice_fault(field, count):
+                self._report.error("bad-count", path, *fault, needs=needs)
+            return True  # an encoder refuses what it cannot count
         if target is not None and target.terminated:
             what = f"{target.name} has a terminator, which tells its size"
             self._report.error("bad-count", path, what, "remove the count, or the terminator", needs=needs)
@@ -209,19 +208,6 @@ class FieldBuilder:
                 self._report.error("two-open-ends", (*path, other.name), what, hint, of_key=True, needs=both)
         if open_ends:
             self._check_later_counts(open_ends[0], fields, path, counts)
-
-    def _check_mixed(self, fields: Sequence[Field], path: Path) -> None:
-        """Check that choices and texts with a terminator are not beside records of variable size."""
-        walked = next((each for each in fields if each.walked), None)
-        mixed = next((each for each in fields if each.slot or each.terminated), None)
-        if walked is None or mixed is None:
-            return
-        what = f"{mixed.slot or mixed.name} is beside {walked.name}, whose records vary in size"
-        if mixed is walked:
-            what = f"{mixed.slot} has a case with records that vary in size"
-        hint = f"write fields with if in place of {mixed.slot or mixed.name}, or a text with a count"
-        place = (*path, mixed.name)
-        self._report.error("bad-record", place, what, hint, of_key=True, needs=(place, path))
 
     def _check_packed(self, fields: Sequence[Field], path: Path) -> None:
         """Check that a packed array of variable size has a count."""
@@ -295,7 +281,7 @@ class FieldBuilder:
 
 def _with_counter(field: Field, counter: str | None) -> Field:
     kind = field.type
-    if counter is None or not isinstance(kind, Blob | Array | Records):
+    if counter is None or not isinstance(kind, Blob | Array | Records) or kind.length.fixed:
         return field
     return replace(field, type=replace(kind, length=replace(kind.length, counted_by=counter)))
 

@@ -129,18 +129,13 @@ class RecordBuilder:
         for field in layout.fields:
             place = (*path, "fields", field.name)
             if _takes_rest(field):
-                what = (
-                    f"{field.name} takes the rest of the payload, which a record {layout.name} does not know"
-                )
+                name = field.slot or field.name
+                what = f"{name} takes the rest of the payload, which a record {layout.name} does not know"
                 hint = "put a count before it, or give it a number of items, like [4]"
                 self._report.error("bad-record", place, what, hint, of_key=True)
             if isinstance(field.type, Array) and field.type.packed and not field.type.length.fixed:
                 what = f"{field.name} is packed and of variable size, in a record"
                 self._report.error("bad-record", place, what, "give it a fixed number of items", of_key=True)
-            if field.slot or field.terminated:
-                what = f"{field.slot or field.name} varies in a way that a record {layout.name} cannot have"
-                hint = "write fields with if, or a text with a count"
-                self._report.error("bad-record", place, what, hint, of_key=True)
             if field.optional:
                 what = (
                     f"{field.name} is optional, but bytes after a record {layout.name} may belong to others"
@@ -156,6 +151,8 @@ class RecordBuilder:
 def _takes_rest(field: Field) -> bool:
     kind = field.type
     if not isinstance(kind, Blob | Array | Records) or kind.length.fixed or kind.length.counted_by:
+        return False
+    if field.terminated:
         return False
     return not isinstance(kind, Records) or not kind.last
 

@@ -367,7 +367,7 @@ def _is_optional(value: Value) -> bool:
     return value.field.conditional and not value.field.slot
 
 
-def _guarded(message: Message, value: Value, owner: str, lines: list[str]) -> list[str]:
+def _guarded(message: Message | Layout, value: Value, owner: str, lines: list[str]) -> list[str]:
     """The statements for a value; those of a case only where the tested number selects it."""
     if not value.field.slot:
         return lines
@@ -402,7 +402,7 @@ def _parsed_in(layout: Layout, owner: str, depth: int) -> list[str]:
     for value in layout.values:
         if told := _presence(layout, value):
             lines.append(f"{owner}{told} = strtoul(word(), NULL, 0) != 0ul;")
-        lines += _parsed(value, owner, depth)
+        lines += _guarded(layout, value, owner, _parsed(value, owner, depth))
     return lines
 
 
@@ -412,7 +412,7 @@ def _printed_in(layout: Layout, owner: str, depth: int) -> list[str]:
     for value in layout.values:
         if told := _presence(layout, value):
             lines.append(f'printf(" %d", {owner}{told} ? 1 : 0);')
-        lines += _printed(value, owner, depth)
+        lines += _guarded(layout, value, owner, _printed(value, owner, depth))
     return lines
 
 

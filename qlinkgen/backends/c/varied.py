@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from qlinkgen.backends.c import checks
 from qlinkgen.backends.c.conditions import condition, numbers_of
+from qlinkgen.backends.c.members import count_of, member_of
 from qlinkgen.backends.c.names import count_type
 from qlinkgen.model import naming
 from qlinkgen.plan.payload import CountStep, PayloadPlan, RecordsStep, RecordStep
@@ -16,16 +17,16 @@ def record_size(step: RecordStep | RecordsStep, function: str, value: str) -> st
 
 def size_lines(step: RecordStep | RecordsStep, function: str, total: str) -> list[str]:
     """Statements that add the size of the records of a struct to a local."""
-    value = f"message->{naming.member(step.name)}"
+    value = f"message->{member_of(step)}"
     if isinstance(step, RecordStep):
         return [f"{total} += {record_size(step, function, value)};"]
     most = f"{step.length.maximum}U"
     if not step.record.payload.walked:
-        return [f"{total} += {step.record.size}U * (size_t)message->{step.name}_{step.quantity};"]
+        return [f"{total} += {step.record.size}U * (size_t)message->{count_of(step)};"]
     # The number has not been checked yet.
     test = f"index < {most}"
     if not step.fixed:
-        test = f"({test}) && (index < (size_t)message->{step.name}_{step.quantity})"
+        test = f"({test}) && (index < (size_t)message->{count_of(step)})"
     return [
         f"for (size_t index = 0U; {test}; ++index) {{",
         f"    {total} += {record_size(step, function, f'{value}[index]')};",
@@ -59,11 +60,11 @@ class Reader:
 
     def one(self, step: RecordStep) -> list[str]:
         """A single record."""
-        return ["{", *_indented(self._get(step, f"message->{naming.member(step.name)}", ["size"])), "}"]
+        return ["{", *_indented(self._get(step, f"message->{member_of(step)}", ["size"])), "}"]
 
     def counted(self, step: RecordsStep, number: str, *, exact: str = "") -> list[str]:
         """So many records, which have ``exact`` bytes if that is given."""
-        value = f"message->{naming.member(step.name)}[index]"
+        value = f"message->{member_of(step)}[index]"
         left = ["left", "size"] if exact else ["size"]
         loop = [
             *self._numbered(step, number),
@@ -83,7 +84,7 @@ class Reader:
 
     def filled(self, step: RecordsStep, exact: str) -> list[str]:
         """The records in so many bytes."""
-        value, least = f"message->{naming.member(step.name)}[found]", step.length.minimum
+        value, least = f"message->{member_of(step)}[found]", step.length.minimum
         few = checks.refusal([f"found < {least}U"], f"{self._upper}_ERROR_LENGTH") if least else []
         return [
             "{",
@@ -99,7 +100,7 @@ class Reader:
 
     def ended(self, step: RecordsStep) -> list[str]:
         """The records up to the last one."""
-        value = f"message->{naming.member(step.name)}[found]"
+        value = f"message->{member_of(step)}[found]"
         end = [f"ended = {is_last(step, value)};", "++found;"]
         return [
             "{",
@@ -121,7 +122,7 @@ class Reader:
         if step.fixed:
             return []
         kind = count_type(step.length.maximum)
-        return [f"message->{step.name}_{step.quantity} = ({kind}){number};"]
+        return [f"message->{count_of(step)} = ({kind}){number};"]
 
     def _get(self, step: RecordStep | RecordsStep, value: str, left: list[str]) -> list[str]:
         """Statements that read one record, whose bytes are subtracted from locals."""

@@ -10,7 +10,7 @@ from qlinkgen.backends.c import checks, varied
 from qlinkgen.backends.c.conditions import condition, numbers_of
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.encode import Encoder
-from qlinkgen.backends.c.members import count_of
+from qlinkgen.backends.c.members import count_of, member_of
 from qlinkgen.backends.c.names import count_type, grouped, unsigned, unsigned_type
 from qlinkgen.backends.c.sizes import local, local_size, size_text, term_text
 from qlinkgen.model import naming
@@ -48,15 +48,16 @@ def size_lines(payload: PayloadPlan, records: Mapping[str, str]) -> list[str]:
     always = sum(each.size or 0 for each in payload.segments if each.presence is None)
     lines = [f"size_t size = {always}U;"]
     for segment in payload.segments:
-        if segment.presence is None and segment.size is not None:
-            continue
-        own = [f"size += {segment.size}U;"]
-        if segment.records is not None:
-            own = varied.size_lines(segment.records, records[segment.records.record.name], "size")
-        elif segment.size is None:
-            own = [f"size += {_struct_size(segment)};"]
-        lines += _guarded(_sent(segment.presence, numbers), own)
+        if segment.presence is not None or segment.size is None:
+            lines += _guarded(_sent(segment.presence, numbers), _added(segment, records, "size"))
     return [*lines, "return size;"]
+
+
+def _added(segment: Segment, records: Mapping[str, str], total: str) -> list[str]:
+    """Statements that add the size of a segment of a struct to a local."""
+    if segment.records is not None:
+        return varied.size_lines(segment.records, records[segment.records.record.name], total)
+    return [f"{total} += {f'{segment.size}U' if segment.size is not None else _struct_size(segment)};"]
 
 
 def _struct_size(segment: Segment) -> str:
@@ -94,14 +95,7 @@ class WalkedEncoder(Encoder):
         """Lines of the function body, without the last one."""
         lines: list[str] = []
         for run in self.payload.runs:
-            kind = count_type(run.length.maximum)
-            # A member of a union is read only where its case is sent.
-            case = run.presence is not None and run.presence.slot
-            lines.append(
-                f"{kind} {local(run.name)} = 0U;"
-                if case
-                else f"const {kind} {local(run.name)} = message->{count_of(run)};"
-            )
+            lines.append(self._number_in_struct(run))
         lines += [f"const size_t size = {self.function}_size_(message);", ""]
         lines += self._checks()
         if any(segment.records for segment in self.payload.segments):
@@ -123,9 +117,16 @@ class WalkedEncoder(Encoder):
         found: list[str] = []
         for run in self.payload.runs:
             if any(re.search(rf"\b{local(run.name)}\b", line) for line in lines):
-                kind = count_type(run.length.maximum)
-                found.append(f"const {kind} {local(run.name)} = message->{run.name}_{run.quantity};")
+                found.append(self._number_in_struct(run))
         return [*found, *([""] if found else []), *lines]
+
+    def _number_in_struct(self, run: RunStep) -> str:
+        """The declaration of a number of items; a member of a union is read only where its case is sent."""
+        kind, number = count_type(run.length.maximum), f"message->{count_of(run)}"
+        if run.presence is not None and run.presence.slot:
+            sent = condition(run.presence.when, numbers_of(self.payload), _in_struct)
+            number = f"({kind})(({sent}) ? {number} : 0U)"
+        return f"const {kind} {local(run.name)} = {number};"
 
     def _segments(self) -> list[str]:
         """Statements that write each segment."""
@@ -144,7 +145,7 @@ class WalkedEncoder(Encoder):
             self.lines += self._sized(step, [])
         elif isinstance(step, RecordStep | RecordsStep) and step.walked:
             function = self.layouts.records[step.record.name]
-            value = f"message->{naming.member(step.name)}"
+            value = f"message->{member_of(step)}"
             if isinstance(step, RecordsStep):
                 self.lines += self._loop(step, self._put_walked(step, function, f"{value}[index]"))
             else:
@@ -158,17 +159,19 @@ class WalkedEncoder(Encoder):
         return [f"{function}_put_(&{value}, payload);", f"payload += {size};"]
 
     def _sized(self, step: CountStep, refused: list[str]) -> list[str]:
-        """Statements that add up the bytes of records, and refuse or write the count."""
-        run, total = self.payload.run(step.run), f"{step.run}_bytes"
-        assert isinstance(run, RecordsStep)
-        function = self.layouts.records[run.record.name]
+        """Statements that add up the bytes of records or of a choice, and refuse or write the count."""
+        total = f"{step.run}_bytes"
         number = f"({total} + {step.term.more}U)" if step.term.more else total
         lines = refused
         if not refused:
             outer, self.lines = self.lines, []
             self._put(step.place, step.integer, f"({unsigned_type(step.integer.bits)}){number}")
             lines, self.lines = self.lines, outer
-        inner = [f"size_t {total} = 0U;", "", *varied.size_lines(run, function, total), *lines]
+        inner = [f"size_t {total} = 0U;", ""]
+        for segment in self.payload.counted(step.run):
+            test = _sent(segment.presence, numbers_of(self.payload)) if segment.counted else ""
+            inner += _guarded(test, _added(segment, self.layouts.records, total))
+        inner += lines
         return ["{", *(f"    {line}" if line else "" for line in inner), "}"]
 
     def _check(self, step: Step) -> None:
@@ -181,7 +184,7 @@ class WalkedEncoder(Encoder):
             return
         super()._check(step)
         if isinstance(step, RecordsStep) and step.last:
-            value = f"message->{naming.member(step.name)}[index]"
+            value = f"message->{member_of(step)}[index]"
             ends = f"({varied.is_last(step, value)})"
             differs = f"{ends} != ((index + 1U) == {local(step.name)})"
             refusal = checks.refusal([differs], f"{self.layouts.prefix.upper()}_ERROR_RANGE")
@@ -199,8 +202,6 @@ class WalkedEncoder(Encoder):
             if isinstance(segment.records, RecordsStep) and not segment.records.fixed:
                 run = segment.records
             if run is not None:
-                if run.presence is not None and run.presence.slot:
-                    self.lines.append(f"{local(run.name)} = message->{count_of(run)};")
                 held = Within(0, (1 << int(count_type(run.length.maximum)[4:-2])) - 1)
                 bounds = self.payload.sendable(run)
                 self._refuse(checks.broken([bounds], local(run.name), held, 16), "LENGTH")
@@ -246,8 +247,7 @@ class WalkedDecoder(Decoder):
         lines = [f"const {kind}_t defaults = {self.init};"]
         lines += self._locals()
         lines.append("*message = defaults;")
-        for segment in self.payload.segments:
-            lines += self._segment(segment, numbers)
+        lines += self._all(numbers)
         self.refuse(["size != 0U"], "LENGTH")
         return [*lines, *self._flushed()]
 
@@ -256,14 +256,36 @@ class WalkedDecoder(Decoder):
         numbers = numbers_of(self.payload)
         kind = self.init.removesuffix("_INIT").lower()
         lines = [f"const {kind}_t defaults = {self.init};", "const size_t total = size;"]
-        lines += [*self._locals(), "", "*message = defaults;"]
-        for segment in self.payload.segments:
-            lines += self._segment(segment, numbers)
+        lines += [*self._locals(), "", "*message = defaults;", *self._all(numbers)]
         return [*lines, "*used = total - size;"]
 
-    def _locals(self) -> list[str]:
-        """Declarations of numbers of items, and of bytes of records."""
+    def _all(self, numbers: dict[str, Scalar]) -> list[str]:
+        """Statements that decode every segment."""
         lines: list[str] = []
+        for segment, cases in self.payload.by_choice:
+            own = [line for each in cases or (segment,) for line in self._segment(each, numbers)]
+            lines += self._within(segment.slot, own) if segment.counted else own
+        return lines
+
+    def _within(self, slot: str, lines: list[str]) -> list[str]:
+        """The statements of a choice that fills its bytes."""
+        size, error = f"{slot}_bytes", f"{self.layouts.prefix.upper()}_ERROR_LENGTH"
+        return [
+            *checks.refusal([f"size < {size}"], error),
+            "{",
+            f"    const size_t after = size - {size};",
+            "",
+            f"    size = {size};",
+            *(f"    {line}" if line else "" for line in lines),
+            *(f"    {line}" for line in checks.refusal(["size != 0U"], error)),
+            "    size = after;",
+            "}",
+        ]
+
+    def _locals(self) -> list[str]:
+        """Declarations of numbers of items, and of bytes of records and choices."""
+        choices = dict.fromkeys(each.slot for each in self.payload.segments if each.counted)
+        lines = [f"size_t {slot}_bytes = 0U;" for slot in choices]
         for segment in self.payload.segments:
             run, records = segment.run, segment.records
             if run is not None:

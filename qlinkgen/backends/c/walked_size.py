@@ -23,6 +23,8 @@ from qlinkgen.plan.payload import (
     Segment,
     Step,
     ValueStep,
+    by_choice,
+    deciding,
     holders,
     renamed,
     renamed_tests,
@@ -45,8 +47,7 @@ class _Sizer:
     ) -> None:
         """``last`` tests values of a record."""
         self._learner, self._segments, self._depth = learner, segments, depth
-        tests = [test for each in segments if each.presence for test in each.presence.when]
-        self._tested = {test.value for test in (*tests, *last)}
+        self._tested = {test.value for test in (*deciding(segments), *last)}
         self._steps = [step for each in segments for step in each.steps]
         self._counted: set[tuple[str, bool]] = set()
         # Received bytes have not been checked: a bool may be any number here.
@@ -70,7 +71,13 @@ class _Sizer:
         return [*lines, *(f"size_t {name} = 0U;" for name in found)]
 
     def _walk(self) -> list[str]:
-        return [line for segment in self._segments for line in self._segment(segment)]
+        lines: list[str] = []
+        for segment, cases in by_choice(self._segments):
+            if segment.counted:
+                lines += [f"*size += {segment.slot}_bytes;", f"at += {segment.slot}_bytes;"]
+                continue
+            lines += [line for each in cases or (segment,) for line in self._segment(each)]
+        return lines
 
     def _segment(self, segment: Segment) -> list[str]:
         learner, run = self._learner, segment.run

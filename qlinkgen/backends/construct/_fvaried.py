@@ -1,4 +1,4 @@
-"""Records that are read one by one: of variable size, or up to a last one."""
+"""Records that are read one by one: of variable size, or up to a last one; choices with a count."""
 
 from __future__ import annotations
 
@@ -21,10 +21,16 @@ from ._fwalks import Presence, Test, Walked, _values
 
 
 class SizeOf(Count):
-    """The bytes of the records ``of``; ``more`` bytes are counted beside them."""
+    """The bytes of the records or of the choice ``of``; ``more`` bytes are counted beside them.
 
-    def __init__(self, subcon: Construct, of: str, *, more: int = 0) -> None:
+    A choice has at most ``most`` bytes.
+    """
+
+    def __init__(
+        self, subcon: Construct, of: str, *, more: int = 0, most: int = 0
+    ) -> None:
         super().__init__(subcon, of, more=more)
+        self.most = most
 
 
 class Several(Construct):
@@ -83,7 +89,7 @@ class One(Several):
 
 
 class Varied(Walked):
-    """A message with records that are read one by one.
+    """A message with records that are read one by one, or a choice whose bytes are counted.
 
     ``most`` is the maximum size of its payload.
     """
@@ -103,6 +109,9 @@ class Varied(Walked):
         self.several = {
             field.name: found for field in fields if (found := _several(field))
         }
+        sized = {each.subcon.of for each in fields if isinstance(each.subcon, SizeOf)}
+        #: Choices that fill their bytes.
+        self.filled = sized & {*self.slots.values()}
 
     def _varies(self, field: Renamed) -> bool:
         return field.name in self.several or super()._varies(field)
@@ -118,38 +127,61 @@ class Varied(Walked):
         self, data: bytes, at: int, end: int, path: str
     ) -> tuple[Container, int, Mapping[str, int]]:
         """The values at an offset, that of their end, and the raw numbers that tests need."""
-        counts, numbers, sizes = dict(self.known), dict[str, int](), dict[str, int]()
-        values, cells = Container(), dict[str, bytes]()
+        found, limit, before = _Found(self.known), end, ""
         for segment in self._segments():
-            name, left = segment[0].name, end - at
-            if not self._present(segment[0], numbers, left):
-                values.update(
-                    dict.fromkeys(name for each in segment for name in _values(each))
-                )
-            elif several := self.several.get(name):
-                limit = self._limit(segment[0], counts, sizes, (at, end))
-                number = counts.get(name)
-                values[name], at = several_at(several, data, at, limit, number)
-                if (name in sizes or self._rests(segment[0], counts)) and at != limit:
-                    raise RangeError(f"{name} does not fill its bytes", path=path)
-            else:
-                self._infer(segment[0], counts, data[at:end], path)
-                sized = [self._size(each, counts) for each in segment]
-                if left < sum(sized):
-                    raise RangeError(f"{left} bytes are left for {name}", path=path)
-                for field, size in zip(segment, sized, strict=True):
-                    cell = data[at : at + size]
-                    found = field.parse(cell, number=counts.get(field.name))
-                    if isinstance(field.subcon, BitFields):
-                        values.update(found)
-                    elif isinstance(field.subcon, Default):
-                        values[field.name] = found
-                    self._follow(field, cell, cells, path)
-                    cells[field.name] = cell
-                    self._note(field, cell, numbers)
-                    self._tell(field, cell, counts, sizes, path)
-                    at += size
-        return values, at, numbers
+            if (slot := self._filling(segment[0])) != before:
+                _check_filled(before, at, limit, path)
+                limit, before = at + found.sizes[slot] if slot else end, slot
+                if limit > end:
+                    raise RangeError(f"{slot} has no room", path=path)
+            at = self._read_segment(segment, found, data, (at, limit), path)
+        _check_filled(before, at, limit, path)
+        values = Container(self._by_value(found.values)) if self.slots else found.values
+        return values, at, found.numbers
+
+    def _read_segment(
+        self,
+        segment: Sequence[Renamed],
+        found: _Found,
+        data: bytes,
+        span: tuple[int, int],
+        path: str,
+    ) -> int:
+        """Read a segment at the beginning of a span; the offset of its end."""
+        (at, limit), name = span, segment[0].name
+        if not self._present(segment[0], found.numbers, limit - at):
+            absent = (name for each in segment for name in _values(each))
+            found.values.update(dict.fromkeys(absent))
+            return at
+        if several := self.several.get(name):
+            most = self._limit(segment[0], found.counts, found.sizes, span)
+            number = found.counts.get(name)
+            found.values[name], at = several_at(several, data, at, most, number)
+            full = name in found.sizes or self._rests(segment[0], found.counts)
+            _check_filled(name if full else "", at, most, path)
+            return at
+        self._infer(segment[0], found.counts, data[at:limit], path)
+        sized = [self._size(each, found.counts) for each in segment]
+        if limit - at < sum(sized):
+            raise RangeError(f"{limit - at} bytes are left for {name}", path=path)
+        for field, size in zip(segment, sized, strict=True):
+            cell = data[at : at + size]
+            value = field.parse(cell, number=found.counts.get(field.name))
+            if isinstance(field.subcon, BitFields):
+                found.values.update(value)
+            elif isinstance(field.subcon, Default):
+                found.values[field.name] = value
+            self._follow(field, cell, found.cells, path)
+            found.cells[field.name] = cell
+            self._note(field, cell, found.numbers)
+            self._tell(field, cell, found.counts, found.sizes, path)
+            at += size
+        return at
+
+    def _filling(self, field: Renamed) -> str:
+        """The choice that fills its bytes, of which a field is a case; "" for other fields."""
+        slot = self.slots.get(field.name, "")
+        return slot if slot in self.filled else ""
 
     def _rests(self, field: Renamed, counts: Mapping[str, int]) -> bool:
         """Whether records take the rest of the payload."""
@@ -169,10 +201,7 @@ class Varied(Walked):
         if field.name in sizes:
             limit = at + sizes[field.name]
         elif self._rests(field, counts):
-            # A field after the rest that may be absent is absent where the rest is present.
-            after = self.fields[self.fields.index(field) + 1 :]
-            always = (each for each in after if each.name not in self.presence)
-            limit = end - sum(self._size(each, counts) for each in always)
+            limit = end - self._after(field, counts)
         if not at <= limit <= end:
             raise RangeError(f"{field.name} has no room")
         return limit
@@ -188,18 +217,20 @@ class Varied(Walked):
         """Learn from a count."""
         count = field.subcon
         several = self.several.get(count.of) if isinstance(count, Count) else None
-        if several is None:
+        if isinstance(count, SizeOf):
+            known, least, most = sizes, 0, count.most
+            if several:
+                least = several.minimum * several.record.least
+                most = several.maximum * several.record.most
+            number = count.number(cell) - count.more
+            if not least <= number <= min(self.most, most):
+                raise RangeError(f"{number} bytes of {count.of}", path=path)
+        elif several:
+            known = counts
+            number = several.checked(count.number(cell) - count.more, path)
+        else:
             self._learn(field, cell, counts, path)
             return
-        number = count.number(cell) - count.more
-        known = sizes if isinstance(count, SizeOf) else counts
-        if isinstance(count, SizeOf):
-            least = several.minimum * several.record.least
-            most = min(self.most, several.maximum * several.record.most)
-            if not least <= number <= most:
-                raise RangeError(f"{number} bytes of {count.of}", path=path)
-        else:
-            several.checked(number, path)
         if known.setdefault(count.of, number) != number:
             raise RangeError(f"{field.name} does not agree with {count.of}", path=path)
 
@@ -215,6 +246,9 @@ class Varied(Walked):
         """The offset of the end of what begins at an offset, and the raw numbers that tests need."""
         counts, numbers, sizes = dict(self.known), dict[str, int](), dict[str, int]()
         for segment in self._segments():
+            if slot := self._filling(segment[0]):
+                at += sizes.pop(slot, 0)
+                continue
             if not self._present(segment[0], numbers, 1):
                 continue
             if several := self.several.get(segment[0].name):
@@ -247,9 +281,28 @@ class Varied(Walked):
     def _cell(self, field: Renamed, values: Container, path: str) -> bytes:
         if not isinstance(field.subcon, SizeOf):
             return super()._cell(field, values, path)
-        counted = next(each for each in self.fields if each.name == field.subcon.of)
-        size = len(super()._cell(counted, values, path)) + field.subcon.more
-        return bytes(field.subcon.subcon.build(size))
+        of = field.subcon.of
+        counted = (
+            self._sent(of, values, path)
+            if of in self.filled
+            else next(each for each in self.fields if each.name == of)
+        )
+        size = len(super()._cell(counted, values, path)) if counted else 0
+        return bytes(field.subcon.subcon.build(size + field.subcon.more))
+
+    def _sent(self, slot: str, values: Container, path: str) -> Renamed | None:
+        """The case of a choice that is sent."""
+        numbers: dict[str, int] = {}
+        for field in self.fields:
+            bits = isinstance(field.subcon, BitFields)
+            inner = field.subcon.fields if bits else [field]
+            if any(each.name in self.tested for each in inner):
+                self._note(field, super()._cell(field, values, path), numbers)
+        cases = (each for each in self.fields if self.slots.get(each.name) == slot)
+        return next((each for each in cases if self._present(each, numbers, 0)), None)
+
+    def _after(self, field: Renamed, counts: Mapping[str, int]) -> int:
+        return 0 if self._filling(field) else super()._after(field, counts)
 
     def _build(
         self, obj: Values, stream: BinaryIO, context: Container, path: str
@@ -265,10 +318,9 @@ class Varied(Walked):
 class VariedRecord(Varied):
     """A record of variable size, or one that can be the last one: its name and its fields."""
 
-    def __init__(
-        self, name: str, *fields: Renamed, most: int, presence: Sequence[Presence] = ()
-    ) -> None:
-        super().__init__(name, 0, *fields, most=most, presence=presence)
+    def __init__(self, name: str, *fields: Renamed, most: int, **settings: Any) -> None:
+        # Any: the presence and the choices of a Walked.
+        super().__init__(name, 0, *fields, most=most, **settings)
 
     def written(self, obj: object, stream: BinaryIO, path: str) -> Mapping[str, int]:
         """Write a record; returns the raw numbers that tests need."""
@@ -280,6 +332,23 @@ class VariedRecord(Varied):
 
     def _sizeof(self, context: Container, path: str) -> int:
         return int(self.least)
+
+
+class _Found:
+    """What has been read of a message or record: values, bytes, and what later fields depend on."""
+
+    def __init__(self, known: Mapping[str, int]) -> None:
+        self.values = Container()
+        self.cells: dict[str, bytes] = {}
+        self.counts = dict(known)
+        self.numbers: dict[str, int] = {}
+        self.sizes: dict[str, int] = {}
+
+
+def _check_filled(name: str, at: int, limit: int, path: str) -> None:
+    """Check that what fills its bytes ends with them; "" for what does not."""
+    if name and at != limit:
+        raise RangeError(f"{name} does not fill its bytes", path=path)
 
 
 class _Taken:

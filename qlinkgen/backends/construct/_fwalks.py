@@ -227,17 +227,19 @@ class Walked(Message):
         if isinstance(run, TerminatedText):
             counts[field.name] = run.checked(data.find(run.terminator), path)
             return
-        # A field after the rest that may be absent is absent where the rest is present.
-        after = self.fields[self.fields.index(field) + 1 :]
-        always = (each for each in after if each.name not in self.presence)
-        number, odd = divmod(
-            left - sum(self._size(each, counts) for each in always), run.size
-        )
+        number, odd = divmod(left - self._after(field, counts), run.size)
         if odd:
             raise RangeError(
                 f"the bytes left do not divide into items of {field.name}", path=path
             )
         counts[field.name] = run.checked(number, path)
+
+    def _after(self, field: Renamed, counts: Mapping[str, int]) -> int:
+        """The size of what follows a field that takes the rest of the payload."""
+        # A field after the rest that may be absent is absent where the rest is present.
+        after = self.fields[self.fields.index(field) + 1 :]
+        always = (each for each in after if each.name not in self.presence)
+        return sum(self._size(each, counts) for each in always)
 
     def _build(
         self, obj: Values, stream: BinaryIO, context: Container, path: str

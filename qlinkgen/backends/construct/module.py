@@ -10,10 +10,12 @@ from qlinkgen.backends.construct.payload import (
     Names,
     Types,
     beside,
+    choices_of,
     comment,
     fields,
     integer,
     is_filled,
+    is_varied,
     presence_of,
     record,
 )
@@ -113,7 +115,7 @@ def _message(message: MessagePlan, types: Types) -> Call:
     elif message.payload.walked:
         settings |= _walking(message.payload)
     name = _class_of(message.payload)
-    if any(segment.records for segment in message.payload.segments):
+    if is_varied(message.payload):
         settings["most"] = message.payload.most
     return Call(
         name, (message.name, hexadecimal(message.id), *fields(message, types)), tuple(settings.items())
@@ -125,7 +127,7 @@ def _walking(payload: PayloadPlan) -> dict[str, Node]:
     settings: dict[str, Node] = {"presence": Sequence(tuple(presence_of(payload)))}
     if payload.most < sum(map(full_size, payload.steps)):
         settings["most"] = payload.most
-    if choices := tuple(_choices(payload)):
+    if choices := tuple(choices_of(payload)):
         settings["choices"] = Sequence(choices)
     return settings
 
@@ -134,7 +136,7 @@ def _class_of(payload: PayloadPlan) -> str:
     if payload.separator:
         return "Separated"
     prefix = "Filled" if is_filled(payload) else ""
-    if any(segment.records for segment in payload.segments):
+    if is_varied(payload):
         return f"{prefix}Varied"
     if payload.walked:
         return f"{prefix}Walked"
@@ -144,14 +146,6 @@ def _class_of(payload: PayloadPlan) -> str:
 def _absent(payload: PayloadPlan) -> Iterator[Presence]:
     """What decides about each text that may be absent."""
     return (step.presence for step in payload.steps if step.presence)
-
-
-def _choices(payload: PayloadPlan) -> Iterator[Node]:
-    """The name of each choice, and the fields that are its cases."""
-    for _, cases in payload.by_choice:
-        presences = [each.presence for each in cases if each.presence]
-        if presences:
-            yield presences[0].slot, tuple(each.field for each in presences)
 
 
 # Frames

@@ -12,7 +12,7 @@ from typing import assert_never
 from qlinkgen.backends.construct.algorithms import algorithm
 from qlinkgen.backends.construct.tree import Call, Definition, Named, Node, Number, Ref, Sequence, hexadecimal
 from qlinkgen.model import naming
-from qlinkgen.model.fields import Layout
+from qlinkgen.model.fields import Layout, greatest_size
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import record_key
@@ -215,8 +215,9 @@ def record(layout: Layout, types: Types) -> Call:
     prefix = "Filled" if is_filled(payload) else ""
     if not payload.walked and layout.name not in types.ended:
         return Call(f"{prefix}Record", inside)
-    presence = tuple(presence_of(payload))
+    presence, choices = tuple(presence_of(payload)), tuple(choices_of(payload))
     settings: dict[str, Node] = {"presence": Sequence(presence)} if presence else {}
+    settings |= {"choices": Sequence(choices)} if choices else {}
     return Call(f"{prefix}VariedRecord", inside, (*settings.items(), ("most", payload.most)))
 
 
@@ -226,6 +227,18 @@ def presence_of(payload: PayloadPlan) -> Iterator[Node]:
         if presence := segment.presence:
             tests: tuple[Node, ...] = tuple((each.value, each.ranges, each.negated) for each in presence.when)
             yield presence.field, tests, presence.given
+
+
+def choices_of(payload: PayloadPlan) -> Iterator[Node]:
+    """The name of each choice, and the fields that are its cases."""
+    for segment, cases in payload.by_choice:
+        if presences := [each.presence for each in cases if each.presence]:
+            yield segment.slot, tuple(each.field for each in presences)
+
+
+def is_varied(payload: PayloadPlan) -> bool:
+    """Whether it has records that are read one by one, or a choice whose bytes are counted."""
+    return any(segment.records or segment.counted for segment in payload.segments)
 
 
 def beside(part: CellPart, types: Types) -> Call:
@@ -255,7 +268,7 @@ class _Field:
             case ReservedStep():
                 return self._named(step, _reserved(step))
             case CountStep():
-                return self._named(step, _count(step))
+                return self._named(step, _count(step, self._most(step)))
             case BitsStep():
                 members = tuple(map(self._member, step.members))
                 return self._named(step, Call("BitFields", (integer(step.integer, signed=False), *members)))
@@ -269,6 +282,11 @@ class _Field:
                 return self._record(step)
             case _:
                 assert_never(step)
+
+    def _most(self, step: CountStep) -> tuple[tuple[str, Node], ...]:
+        """The maximum size of a choice whose bytes are counted."""
+        cases = [each for each in self._stated.values() if each.slot == step.run]
+        return (("most", greatest_size(cases)),) if cases else ()
 
     def _octets(self, step: BytesStep) -> Named:
         kind, default = ("TextField", step.default.decode()) if step.text else ("BytesField", step.default)
@@ -343,11 +361,11 @@ def _reserved(step: ReservedStep) -> Call:
     return Call("Rebuild", (Call("Bytes", (step.integer.size,)), step.integer.pack(step.value)))
 
 
-def _count(step: CountStep) -> Call:
+def _count(step: CountStep, most: tuple[tuple[str, Node], ...]) -> Call:
     term = step.term
     if step.sized:
         more = (("more", term.more),) if term.more else ()
-        return Call("SizeOf", (integer(step.integer), step.run), more)
+        return Call("SizeOf", (integer(step.integer), step.run), (*more, *most))
     scale: tuple[Node, ...] = (term.factor,) if term.packed or term.factor > 1 else ()
     packed = (("packed", True),) if term.packed else ()
     more = (("more", term.more),) if term.more else ()

@@ -51,20 +51,25 @@ def octets_of(step: RecordStep | RecordsStep, place: Place) -> str:
     return f'b"".join([{name}.to_bytes(each) for each in {source}])'
 
 
-def read_lines(segment: Segment, payload: PayloadPlan, place: Place, offset: str) -> list[str]:
-    """The statements that read walked records at the local ``at``; ``offset`` is that in the payload."""
+def read_lines(
+    segment: Segment, payload: PayloadPlan, place: Place, offset: str, end: str = "end"
+) -> list[str]:
+    """The statements that read walked records at the local ``at``, before the local ``end``.
+
+    ``offset`` is that in the payload.
+    """
     step, wrong = segment.records, f"    raise {place.use('LayoutError')}"
     assert step is not None
     name, kind = held(step), place.classes[step.record.name]
     exact = isinstance(step, RecordsStep) and (segment.rest is not None or is_sized(payload, step.name))
-    limit = f"{step.name}_end" if exact else "end"
+    limit = f"{step.name}_end" if exact else end
     lines: list[str] = []
     if exact and segment.rest is not None:
         rest = integers.size_text(segment.rest)
         rest = f"({rest})" if " " in rest else rest
-        lines = [f"{limit} = end{f' - {rest}' if rest != '0' else ''}", f"if {limit} < at:", wrong]
+        lines = [f"{limit} = {end}{f' - {rest}' if rest != '0' else ''}", f"if {limit} < at:", wrong]
     elif exact:
-        lines = [f"{limit} = at + {step.name}_bytes", f"if {limit} > end:", wrong]
+        lines = [f"{limit} = at + {step.name}_bytes", f"if {limit} > {end}:", wrong]
     given = [kind, place.data, "at", limit]
     target = f"message.{name}, at"
     if isinstance(step, RecordStep):

@@ -42,11 +42,13 @@ class WalkedEncoder(Encoder):
         self._tabled = None
         runs = (run for run in self.message.payload.runs if not (run.presence and run.presence.slot))
         lines = [line for run in runs for line in self._counted(run)]
+        for segment, cases in self.message.payload.by_choice:
+            lines += self._ahead(cases) if segment.counted else []
         lines.append('data = b""')
         before = ""
         for segment, cases in self.message.payload.by_choice:
             if cases:
-                lines += self._choice(cases)
+                lines += [f"data += {segment.slot}_octets"] if segment.counted else self._choice(cases)
                 continue
             lines += self._segment(segment, before)
             if segment.presence is not None and segment.presence.optional:
@@ -112,6 +114,11 @@ class WalkedEncoder(Encoder):
         test = condition([_python(each) for each in presence.when], "self.{}")
         found = [f"if {test}:", *indented([*missing, *lines])]
         return [*found, "else:", *indented(surplus)] if surplus else found
+
+    def _ahead(self, cases: Sequence[Segment]) -> list[str]:
+        """The statements that encode a choice before the count of its bytes."""
+        octets, size = f"{cases[0].slot}_octets", f"{cases[0].slot}_bytes"
+        return ['data = b""', *self._choice(cases), f"{octets} = data", f"{size} = len({octets})"]
 
     def _choice(self, cases: Sequence[Segment]) -> list[str]:
         """The statements of the cases of a choice."""
@@ -182,6 +189,8 @@ class WalkedDecoder(Decoder):
     _unpacked: int = 0
     #: Offsets count from the local ``at``.
     _walking: bool = False
+    #: The local with the offset that a segment extends to at most.
+    _end: str = "end"
     _counted_runs: set[tuple[str, bool]] = field(default_factory=set)
 
     def statements(self) -> list[str]:
@@ -215,13 +224,14 @@ class WalkedDecoder(Decoder):
         run = segment.run
         lines = [] if run is None else self._measured(run, segment)
         if segment.records is not None:
-            lines = read_lines(segment, self.message.payload, self.place, self._offset(segment.steps[0]))
+            at = self._offset(segment.steps[0])
+            lines = read_lines(segment, self.message.payload, self.place, at, self._end)
         else:
             size = str(segment.size) if run is None else times(run)
             if segment.terminator:
                 size += " + 1"
             elif run is None or segment.rest is None:
-                lines += [f"if end - at < {size}:", self._bad_layout]
+                lines += [f"if {self._end} - at < {size}:", self._bad_layout]
             for step in segment.steps:
                 self._step(step)
             lines += [*self._flushed(), f"at += {size}"]
@@ -237,6 +247,16 @@ class WalkedDecoder(Decoder):
 
     def _choice(self, cases: Sequence[Segment]) -> list[str]:
         """The statements of the cases of a choice."""
+        if cases[0].counted:
+            slot = cases[0].slot
+            self._end = f"{slot}_end"
+            limit = [f"{self._end} = at + {slot}_bytes", f"if {self._end} > end:", self._bad_layout]
+            lines = [*limit, *self._cases(cases), f"if at != {self._end}:", self._bad_layout]
+            self._end = "end"
+            return lines
+        return self._cases(cases)
+
+    def _cases(self, cases: Sequence[Segment]) -> list[str]:
         lines, word = list[str](), "if"
         for segment in cases:
             assert segment.presence is not None
@@ -248,14 +268,16 @@ class WalkedDecoder(Decoder):
     def _measured(self, run: RunStep, segment: Segment) -> list[str]:
         """The statements that count a run which takes the rest, or ends with a terminator."""
         if segment.terminator:
-            count, data = f"{run.name}_count", f"bytes({self.place.data}[at:end])"
+            count, data = f"{run.name}_count", f"bytes({self.place.data}[at:{self._end}])"
             bounds = Within(run.length.minimum, run.length.maximum)
             found = f"{count} = {data}.find({literal(segment.terminator)})"
             return [found, f"if {integers.broken(bounds, count)}:", self._bad_layout]
         if segment.rest is None:
             return []
         rest = integers.size_text(segment.rest)
-        left = "end - at" if rest == "0" else f"end - at - ({rest})" if " " in rest else f"end - at - {rest}"
+        left = f"{self._end} - at"
+        if rest != "0":
+            left += f" - ({rest})" if " " in rest else f" - {rest}"
         return divided(run, left, run.item_size, self._bad_layout)
 
     def _flushed(self) -> list[str]:
@@ -287,7 +309,6 @@ class WalkedDecoder(Decoder):
     def _count_step(self, step: CountStep, at: Size) -> None:
         number = self._get(step.integer, f"{step.name}_raw", at)
         self._put_together(step.integer, number, step.name, self._offset(step))
-        run = self.message.payload.run(step.run)
         if (step.run, step.sized) in self._counted_runs:
             self._values += [f"if {number} != {integers.count_text(step)}:", self._bad_layout]
             return
@@ -295,7 +316,7 @@ class WalkedDecoder(Decoder):
         if step.sized:
             self._values += sized_lines(step, number, self._bad_layout)
             return
-        own = integers.own_bytes(step.term, number)
+        run, own = self.message.payload.run(step.run), integers.own_bytes(step.term, number)
         self._values += divided(run, own, step.scale, self._bad_layout)
 
 
@@ -319,8 +340,8 @@ class VariedDecoder(WalkedDecoder):
         self._tabled = None
         self._walking = True
         lines = ["start = at", "message = _new(cls)"]
-        for segment in self.message.payload.segments:
-            lines += self._segment(segment)
+        for segment, cases in self.message.payload.by_choice:
+            lines += self._choice(cases) if cases else self._segment(segment)
         used = any("start" in line for line in lines[1:])
         return [*lines[0 if used else 1 :], "return message, at"]
 

@@ -21,6 +21,8 @@ from qlinkgen.plan.payload import (
     Segment,
     Step,
     ValueStep,
+    by_choice,
+    deciding,
     holders,
     renamed,
     renamed_tests,
@@ -52,17 +54,20 @@ class _Measure:
 
     def lines(self, segments: Sequence[Segment], last: Sequence[Test]) -> list[str]:
         """The statements for a message or record; ``last`` tests values of a record."""
-        tests = [test for each in segments if each.presence for test in each.presence.when]
-        self._tested = {test.value for test in (*tests, *last)}
+        self._tested = {test.value for test in (*deciding(segments), *last)}
         self._known = set[tuple[str, bool]]()
         self._steps = [step for each in segments for step in each.steps]
         lines: list[str] = []
-        for segment in segments:
-            own = self._segment(segment)
-            presence = segment.presence
-            lines += (
-                own if presence is None else [f"if {condition(presence.when, '{}_raw')}:", *indented(own)]
-            )
+        for segment, cases in by_choice(segments):
+            if segment.counted:
+                size = f"{segment.slot}_bytes"
+                lines += [f"size += {size}", f"start += {size}"]
+                continue
+            for each in cases or (segment,):
+                own, presence = self._segment(each), each.presence
+                lines += (
+                    own if presence is None else [f"if {condition(presence.when, '{}_raw')}:", *indented(own)]
+                )
         return lines
 
     def _segment(self, segment: Segment) -> list[str]:

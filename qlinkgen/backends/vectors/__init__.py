@@ -23,6 +23,7 @@ from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.content import Raw, pack
 from qlinkgen.plan.natives import native_of
 from qlinkgen.plan.payload import ItemsStep, Member, PayloadPlan, RecordsStep, RecordStep, ValueStep
+from qlinkgen.plan.walk import of_values
 
 __all__ = ["KINDS", "generate"]
 
@@ -185,15 +186,14 @@ def _numbers(step: RecordStep | RecordsStep, raw: Raw) -> Json:
 
 def _numbers_of(plan: PayloadPlan, raw: Mapping[str, Raw]) -> Json:
     found: dict[str, Json] = {}
-    for each in plan.settable:
-        value = raw[each.name]
+    for name, (each, value) in of_values(plan, raw).items():
         if isinstance(each, RecordStep | RecordsStep):
-            found[each.name] = _numbers(each, value)
+            found[name] = _numbers(each, value)
         elif isinstance(each, ItemsStep) and value is not None:
             assert isinstance(value, list)
-            found[each.name] = value
+            found[name] = value
         elif isinstance(value, int):
-            found[each.name] = value
+            found[name] = value
     return found
 
 

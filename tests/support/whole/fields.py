@@ -48,6 +48,8 @@ class Structure:
     depth: int
     #: The condition that ends an array.
     last: Doc = field(default_factory=dict)
+    #: Texts in it have terminators, which a frame without a length does not allow.
+    ended: bool = False
 
 
 @dataclass
@@ -143,7 +145,6 @@ class FieldMaker:
     def _new_varied(self) -> None:
         """A record of variable size, perhaps with others in it, or one that can end an array."""
         rng, taken = self.rng, set[str]()
-        inner = [name for name, each in self.varied.items() if each.depth == 1]
         first, last, made, size, depth = self.words.name(taken), Doc(), dict[str, Any](), 1, 1
         bit, more = self.words.name(taken), self.words.name(taken)
         made[first] = {"type": "u8", "bits": {bit: "0..2", more: 6}} if rng.random() < 0.6 else "bool"
@@ -151,39 +152,55 @@ class FieldMaker:
             last = rng.choice(({more: False}, {bit: "0..3"}, {bit: 0, more: "not 1"}))
         test = f"{first}.{more}" if isinstance(made[first], dict) else first
         for _ in range(rng.choice((0, 1, 2, 3) if last else (1, 2, 3))):
-            name, roll = self.words.name(taken), rng.random()
-            if roll < 0.5:
-                kind, spec, step = self._variable_kind()
-                if kind in self.records:
-                    depth = max(depth, 1 + self.records[kind].depth)
-                most = rng.choice((1, 2, 5))
-                self._counted(name, f"{kind}[0..{most}]", spec, made, taken=taken)
-                size += 2 + most * step
-            elif roll < 0.7:
-                spec, step = self._plain()
-                made[name] = {**(spec if isinstance(spec, dict) else {"type": spec}), "if": test}
-                size += step
-            elif roll < 0.85 and inner:
-                kind = rng.choice(inner)
-                depth, other = 2, self.varied[kind]
-                made[name] = kind if rng.random() < 0.5 else f"{kind}[2]"
-                if other.last and rng.random() < 0.7:
-                    made[name] = {"type": f"{kind}[1..2]", "last": other.last}
-                size += 2 * other.size
-            else:
-                made[name], step = self._plain()
-                size += step
+            more_size, inside = self._varied_part(made, taken, test)
+            size, depth = size + more_size, max(depth, 1 + inside)
+        if rng.random() < 0.4:
+            listed, room = list(made.items()), Room(0, 24, open_end=False)
+            self._add_choice(listed, taken, room)
+            made, size = dict(listed), size + 24 - room.left
+            inside = max((self._depth(each) for spec in made.values() for each in _cases_of(spec)), default=0)
+            depth = max(depth, 1 + inside)
         if not self.shape.groups and rng.random() < self.filled:
             kinds = {"type": "u8", "algorithm": rng.choice(("xor8", "sum8", "crc-8/smbus")), "over": [first]}
             made = {first: made.pop(first), self.words.name(taken): kinds, **made}
             size += 1
         varies = any(
-            isinstance(each, dict) and {"if", "counts", "last"} & each.keys() for each in made.values()
+            isinstance(each, dict) and {"if", "counts", "last", "switch", "terminator"} & each.keys()
+            for each in made.values()
         )
-        nested = any(str(each["type"] if isinstance(each, dict) else each).partition("[")[0] in self.varied
-                     for each in made.values())  # fmt: skip
+        nested = any(self.is_varied(each) for each in made.values())
         if depth <= 2 and size <= 60 and (varies or nested or last):
-            self.varied[self.words.name(self.taken)] = Structure({"fields": made}, size, depth, last)
+            ended = "'terminator'" in repr(made) or any(
+                self.varied[name].ended for name in self.varied if f"'{name}" in repr(made)
+            )
+            self.varied[self.words.name(self.taken)] = Structure({"fields": made}, size, depth, last, ended)
+
+    def _varied_part(self, made: Doc, taken: set[str], test: str) -> tuple[int, int]:
+        """A field of a record of variable size: its size, and the number of records inside each other."""
+        rng, name, roll = self.rng, self.words.name(taken), self.rng.random()
+        inner = [name for name, each in self.varied.items() if each.depth == 1]
+        if roll < 0.1 and self.shape.text and self.shape.has_length:
+            most = rng.choice((1, 3, 6))
+            made[name] = {"type": f"text[{rng.choice((0, most - 1))}..{most}]", "terminator": "00"}
+            return most + 1, 0
+        if roll < 0.5:
+            kind, spec, step = self._variable_kind()
+            most = rng.choice((1, 2, 5))
+            self._counted(name, f"{kind}[0..{most}]", spec, made, taken=taken)
+            return 2 + most * step, self.records[kind].depth if kind in self.records else 0
+        if roll < 0.7:
+            spec, step = self._plain()
+            made[name] = {**(spec if isinstance(spec, dict) else {"type": spec}), "if": test}
+            return step, 0
+        if roll < 0.85 and inner:
+            kind = rng.choice(inner)
+            other = self.varied[kind]
+            made[name] = kind if rng.random() < 0.5 else f"{kind}[2]"
+            if other.last and rng.random() < 0.7:
+                made[name] = {"type": f"{kind}[1..2]", "last": other.last}
+            return 2 * other.size, 1
+        made[name], step = self._plain()
+        return step, 0
 
     def _counted(self, name: str, kind: str, spec: Doc, made: Doc, *, taken: set[str]) -> None:
         """A field after a count of its items, of its bytes, or of its bytes and those of the count."""
@@ -196,11 +213,13 @@ class FieldMaker:
     def _varied_field(self, name: str, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
         """One record of variable size, or an array of them: counted, of constant length, or to its end."""
         rng = self.rng
-        kind = rng.choice(list(self.varied))
+        kinds = [each for each, of in self.varied.items() if self.shape.has_length or not of.ended]
+        if not kinds:
+            return
+        kind = rng.choice(kinds)
         record = self.varied[kind]
         opened = any(self._is_open(each, made) for _, each in made)
         rows = any(isinstance(each, dict) and "packed" in each and ".." in each["type"] for _, each in made)
-        rows = rows or any(isinstance(each, dict) and "terminator" in each for _, each in made)
         if opened or rows:
             return
         # Some messages can be longer than the frame allows.
@@ -289,12 +308,10 @@ class FieldMaker:
     def _add_choice(self, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
         """A value whose type an earlier field decides, at the end of the payload."""
         rng = self.rng
-        if any(self._is_varied(each) for _, each in made):
-            return
         specs = [spec for _, spec in made if isinstance(spec, dict)]
         if any(self._is_open(each, made) for _, each in made) or any("optional" in each for each in specs):
             return
-        if any("packed" in spec and ".." in spec["type"] for spec in specs):
+        if any("packed" in spec and not spec["type"].partition("[")[2][:-1].isdigit() for spec in specs):
             return
         tag, size, ref, low, high = self._tag(taken)
         room.left -= size
@@ -310,9 +327,9 @@ class FieldMaker:
         )
         if high - low < 3:
             keys = [low]
-        most = 0
+        most, counted = 0, room.left > 8 and rng.random() < 0.5
         for key in keys:
-            case, size = self._case(room)
+            case, size = self._case(room, last=counted)
             if size > room.left:
                 return
             cases[str(key)] = case
@@ -320,14 +337,30 @@ class FieldMaker:
         spec: Doc = {"switch": ref, "cases": cases}
         covered = len(keys) == 2 and isinstance(keys[0], str)
         if not covered:
-            case, size = ({}, 0) if rng.random() < 0.3 else self._case(room, last=room.open_end)
+            last = room.open_end or counted
+            case, size = ({}, 0) if rng.random() < 0.3 else self._case(room, last=last)
             if size > room.left:
                 return
             spec["default"] = case
+            most = max(most, size)
         if not any(cases.values()) and not spec.get("default"):
             return
         made.insert(rng.randint(0, len(made)), tag)
-        made.append((self.words.name(taken), spec))
+        name = self.words.name(taken)
+        if counted:
+            count = self.words.name(taken)
+            of = rng.choice((name, [count, name], [tag[0], name, count]))
+            made.insert(rng.randint(0, len(made)), (count, {"type": "u16", "counts": of}))
+            most += self._bytes_of("u16", {})
+        made.append((name, spec))
+        room.left -= most
+
+    def _depth(self, case: Any) -> int:
+        """The number of records inside each other in a case of a choice."""
+        if isinstance(case, dict) and "type" not in case:
+            return int(bool(case))
+        kind = str(case["type"] if isinstance(case, dict) else case).partition("[")[0]
+        return self.records[kind].depth if kind in self.records else 0
 
     def _tag(self, taken: set[str]) -> tuple[tuple[str, Any], int, str, int, int]:
         """A field that a choice may test: itself, its size, the reference, and its range."""
@@ -345,7 +378,7 @@ class FieldMaker:
         """What a choice is in one case, and its size."""
         rng, roll = self.rng, self.rng.random()
         if last and roll < 0.5 and room.left > 8:
-            most = rng.choice((3, room.left))
+            most = rng.choice((3, room.left - 4))
             return (f"text[0..{most}]" if self.shape.groups else f"bytes[0..{most}]"), most
         if roll < 0.1:
             return {}, 0
@@ -424,7 +457,7 @@ class FieldMaker:
             if not counting or spec["type"] != "u16" or rng.random() < 0.3:
                 continue
             always = [
-                each for each in specs if self._is_always(specs[each]) and not self._is_varied(specs[each])
+                each for each in specs if self._is_always(specs[each]) and not self.is_varied(specs[each])
             ]
             chosen = [each for each in always if rng.random() < 0.5]
             several = [*chosen, spec["counts"]]
@@ -440,7 +473,7 @@ class FieldMaker:
             counted = spec.get("counts") if isinstance(spec, dict) else None
             run = specs.get(counted) if isinstance(counted, str) else None
             bounds = re.search(r"\[(\d+)\.\.\d+\]", str(run))
-            if run is None or bounds is None or self._is_varied(run) or self.rng.random() < 0.8:
+            if run is None or bounds is None or self.is_varied(run) or self.rng.random() < 0.8:
                 continue
             base = str(run["type"] if isinstance(run, dict) else run).partition("[")[0]
             least = int(bounds[1])
@@ -467,7 +500,10 @@ class FieldMaker:
         kind = str(spec["type"] if isinstance(spec, dict) else spec)
         return ".." not in kind and "[]" not in kind and kind not in ("bytes", "text")
 
-    def _is_varied(self, spec: Any) -> bool:
+    def is_varied(self, spec: Any) -> bool:
+        """Whether a field holds records that are read one by one."""
+        if isinstance(spec, dict) and "switch" in spec:
+            return False
         kind = str(spec["type"] if isinstance(spec, dict) else spec)
         return kind.partition("[")[0] in self.varied
 
@@ -500,7 +536,7 @@ class FieldMaker:
             if (
                 run
                 or name in kept
-                or self._is_varied(specs[name])
+                or self.is_varied(specs[name])
                 or {"if", "const", "reserved", "counts"} & specs[name].keys()
             ):
                 break
@@ -917,7 +953,7 @@ class FieldMaker:
             return
         kind, spec, bits = self._bits_in_a_row()
         most = min(rng.choice((1, 3, 8, 17, 40, 250)), (room.left - room.least - 6) * 8 // bits)
-        if most < 2 or any(self._is_varied(each) for _, each in made):
+        if most < 2 or any(self.is_varied(each) for _, each in made):
             return
         opened = next((at for at, (_, each) in enumerate(made) if self._is_open(each, made)), len(made))
         self._count(name, "items", most, made, opened, taken=taken, room=room)
@@ -1001,7 +1037,7 @@ class FieldMaker:
         rng = self.rng
         most = min(rng.choice((1, 3, 8, 40)), room.left - room.least - 1)
         rows = any("packed" in spec and ".." in spec["type"] for _, spec in made if isinstance(spec, dict))
-        if most < 1 or rows or any(self._is_varied(each) for _, each in made):
+        if most < 1 or rows:
             return
         low = rng.choice((0, 0, min(1, most - 1)))
         spec: Doc = {"type": f"text[{low}..{most}]", "terminator": rng.choice(("00", "0D", "20"))}
@@ -1055,6 +1091,13 @@ class FieldMaker:
             spec["byteorder"] = rng.choice(("big", "little"))
         made.insert(rng.randint(0, end), (self.words.name(taken), spec))
         room.left -= self._bytes_of(kind, {})
+
+
+def _cases_of(spec: Any) -> list[Any]:
+    """What a choice may be; nothing for other fields."""
+    if not isinstance(spec, dict) or "switch" not in spec:
+        return []
+    return [*spec["cases"].values(), *([spec["default"]] if "default" in spec else [])]
 
 
 def _limits(kind: str) -> tuple[int, int]:

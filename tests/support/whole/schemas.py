@@ -267,6 +267,7 @@ class _Maker:
             command["repeat"] = {"counter": rng.choice(counters)}
         varying = {"if", "optional", "switch", "terminator"}
         absent = any(isinstance(spec, dict) and varying & spec.keys() for spec in request.values())
+        absent = absent or any(maker.is_varied(spec) for spec in request.values())
         distinct = "separator" not in command and shape.has_length and not shape.trimmed and not absent
         if distinct and request and not shape.least and rng.random() < 0.15:
             command["empty_request"] = "defaults"

@@ -29,7 +29,16 @@ from tests.support.cdriver import Driver
 from tests.support.whole.reference import Event, Raw, Reference, Seen, Wrong
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.kinds import Kinds
-from tests.support.whole.reference.layouts import Message, Number, Record, Records, Run, Slot, Value
+from tests.support.whole.reference.layouts import (
+    Message,
+    Number,
+    Record,
+    Records,
+    Run,
+    Slot,
+    Value,
+    by_choice,
+)
 from tests.support.whole.reference.special import Packets
 from tests.support.whole.reference.values import decode as decode_payload
 from tests.support.whole.reference.values import default, holds
@@ -86,8 +95,12 @@ class Target:
 
 def by_case(message: Message, value: Callable[[str, Value], Raw]) -> dict[str, Raw]:
     """Raw values; those of a choice under the name of each case. `value` gives one by its name."""
-    found: dict[str, Raw] = {name: value(name, kind) for name, kind in message.beside}
-    for slot in message.slots:
+    return {name: value(name, kind) for name, kind in message.beside} | _slots_by_case(message.slots, value)
+
+
+def _slots_by_case(slots: Sequence[Slot], value: Callable[[str, Value], Raw]) -> dict[str, Raw]:
+    found: dict[str, Raw] = {}
+    for slot in slots:
         numbers = {name: raw for name, raw in found.items() if isinstance(raw, int)}
         sent = not slot.choice or holds(slot, numbers)
         for name, kind in slot.values():
@@ -100,7 +113,7 @@ def native(kind: Value, raw: Any) -> Any:
     if raw is None:
         return None
     if isinstance(kind, Record):
-        return {name: native(each, raw[name]) for name, each in kind.values()}
+        return by_choice(kind.slots, {name: native(each, raw[name]) for name, each in kind.values()})
     if isinstance(kind, Records):
         return [native(kind.record, each) for each in raw]
     if isinstance(kind, Run):
@@ -157,7 +170,7 @@ def told(kind: Value, raw: Any) -> Raw:
     if raw is None:
         return None
     if isinstance(kind, Record):
-        return {name: told(each, raw[name]) for name, each in kind.values()}
+        return _told_record(kind, raw)
     if isinstance(kind, Records):
         return [_told_record(kind.record, each) for each in raw]
     if isinstance(raw, list):
@@ -171,12 +184,30 @@ def _told_record(kind: Record, raw: Mapping[str, Any]) -> dict[str, Raw]:
 
 
 def _record_of(kind: Record, found: Any) -> dict[str, Raw]:
-    return {name: raw_of(each, member(found, name)) for name, each in kind.values()}
+    return _slots_by_case(kind.slots, lambda name, each: raw_of(each, member(found, name)))
 
 
 def member(found: Any, name: str) -> Any:
     """A value of a record: an item of a mapping, or an attribute."""
     return found[name] if isinstance(found, Mapping) else getattr(found, naming.attribute(name))
+
+
+def _chosen(kind: Value, raw: Any) -> Any:
+    """A raw value with one for each choice in its records."""
+    if isinstance(kind, Record) and raw is not None:
+        return by_choice(kind.slots, {name: _chosen(each, raw[name]) for name, each in kind.values()})
+    if isinstance(kind, Records) and raw is not None:
+        return [_chosen(kind.record, each) for each in raw]
+    return raw
+
+
+def _divided(kind: Value, raw: Any) -> Raw:
+    """A raw value with one for each case of the choices in its records."""
+    if isinstance(kind, Record) and raw is not None:
+        return _slots_by_case(kind.slots, lambda name, each: _divided(each, raw[name]))
+    if isinstance(kind, Records) and raw is not None:
+        return [_divided(kind.record, each) for each in raw]  # type: ignore[return-value]  # records alone
+    return raw  # type: ignore[no-any-return]  # of the plan
 
 
 class PythonTarget(Target):
@@ -275,8 +306,9 @@ class InterpreterTarget(Target):
         """See Target."""
         place = address if message.addresses else None
         try:
-            wire = self._codec.encode(message.name, message.by_name(given), place, request)
-            return pack(self._plan.message(message.name).payload, message.by_name(given)), wire
+            values = message.by_name({name: _chosen(kind, given[name]) for name, kind in message.values()})
+            wire = self._codec.encode(message.name, values, place, request)
+            return pack(self._plan.message(message.name).payload, values), wire
         except Unsendable as error:
             raise Wrong("encode", str(error)) from None
 
@@ -294,7 +326,7 @@ class InterpreterTarget(Target):
         found = decoded.values
         found = {**decoded.beside, **found}
         shape = self.reference.by_name[decoded.message.name]
-        values = by_case(shape, lambda name, kind: told(kind, found[name]))
+        values = by_case(shape, lambda name, kind: told(kind, _divided(kind, found[name])))
         return Seen(shape.name, decoded.address, values)
 
     def events(self, direction: Direction, stream: bytes, asked: Sequence[bytes] = ()) -> list[Heard]:

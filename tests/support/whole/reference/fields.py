@@ -93,7 +93,7 @@ class Fields:
             slot for slot in slots if not isinstance(slot.kind, Run | Records) or slot.kind.high is not None
         ]
         return tuple(
-            _bounded(slot, self.most - most_bytes(bounded, along=slot), counts.get(slot.name))
+            _bounded(slot, self.most - most_bytes(bounded, along=slot), counts.get(slot.choice or slot.name))
             for slot in slots
         )
 
@@ -111,11 +111,15 @@ class Fields:
     def _counting_several(slot: Slot, spec: Any, slots: Sequence[Slot]) -> Slot:
         """A count of the bytes of several fields, one of them of variable size."""
         counted = spec.get("counts") if isinstance(spec, dict) else None
+        choices = {each.choice for each in slots if each.choice}
+        if isinstance(counted, str) and counted in choices:
+            return replace(slot, counts_in="bytes")
         if not isinstance(counted, list):
             return slot
-        (run,) = (each.name for each in slots if each.name in counted and not each.fixed)
-        more = slot.more + sum(each.most_bytes for each in slots if each.name in counted and each.name != run)
-        unit = slot.counts_in if len(counted) == 1 else "bytes"
+        names = {each.choice or each.name: each for each in slots}
+        (run,) = (name for name in counted if name in choices or not names[name].fixed)
+        more = slot.more + sum(names[name].most_bytes for name in counted if name != run)
+        unit = slot.counts_in if len(counted) == 1 and run not in choices else "bytes"
         return replace(slot, counts=run, counts_in=unit, more=more)
 
     def _cases(self, name: str, spec: Doc, before: list[Slot]) -> list[Slot]:

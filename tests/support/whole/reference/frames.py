@@ -21,6 +21,7 @@ from tests.support.whole.reference.layouts import (
     Run,
     Slot,
     Test,
+    most_bytes,
     size_of,
 )
 from tests.support.whole.reference.notation import Doc, octets, part_doc, whole_span
@@ -765,7 +766,10 @@ class _Measure:
         self, slots: Sequence[Slot], taker: _Taker, last: Sequence[Test] = (), most: int = 1 << 32
     ) -> None:
         self._slots, self._taker, self._most = slots, taker, most
-        tests = [test for slot in slots for test in slot.when]
+        counted = {slot.counts for slot in slots}
+        tests = [
+            test for slot in slots if not slot.choice or slot.choice not in counted for test in slot.when
+        ]
         self._tested = {name for name, *_ in (*tests, *last)}
         self.numbers: dict[str, int] = {}
         self._counted: dict[str, int] = {}
@@ -773,8 +777,12 @@ class _Measure:
 
     def run(self, at: int) -> int:
         """The offset of its end."""
+        passed = ""
         for slot in self._slots:
-            if holds(slot, self.numbers):
+            if slot.choice in self._sizes:
+                at += self._sizes[slot.choice] if slot.choice != passed else 0
+                passed = slot.choice
+            elif holds(slot, self.numbers):
                 at = self._records(slot, at) if slot.walked else self._plain(slot, at)
         return at
 
@@ -793,9 +801,14 @@ class _Measure:
         return end
 
     def _count(self, slot: Slot, data: bytes) -> None:
-        counted = next(each for each in self._slots if each.name == slot.counts)
         assert isinstance(slot.kind, Number)
         raw = get(slot.kind.pieces, data)
+        if cases := [each for each in self._slots if each.choice == slot.counts]:
+            self._sizes.setdefault(slot.counts, raw - slot.more)
+            if not 0 <= raw - slot.more <= min(most_bytes(cases), self._most):
+                raise Wrong("length")
+            return
+        counted = next(each for each in self._slots if each.name == slot.counts)
         if counted.walked and slot.counts_in == "bytes":
             self._sizes.setdefault(slot.counts, raw - slot.more)
             if not counted.least_bytes <= raw - slot.more <= min(counted.most_bytes, self._most):

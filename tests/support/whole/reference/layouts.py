@@ -296,6 +296,16 @@ def values_of(slots: Iterable[Slot]) -> Iterator[tuple[str, Value]]:
             yield slot.name, slot.kind
 
 
+def by_choice(slots: Iterable[Slot], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Values as users see them: of a choice that of its case, under the name of the choice."""
+    found: dict[str, Any] = {}
+    for slot in slots:
+        for name, _ in slot.values():
+            if not slot.choice or found.get(slot.choice) is None:
+                found[slot.choice or name] = given[name]
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class Message:
     """A message in one direction."""
@@ -329,12 +339,7 @@ class Message:
 
     def by_name(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Values as users see them: of a choice that of its case, under the name of the choice."""
-        found = {name: given[name] for name, _ in self.beside}
-        for slot in self.slots:
-            for name, _ in slot.values():
-                if not slot.choice or found.get(slot.choice) is None:
-                    found[slot.choice or name] = given[name]
-        return found
+        return {name: given[name] for name, _ in self.beside} | by_choice(self.slots, given)
 
     @property
     def walked(self) -> bool:

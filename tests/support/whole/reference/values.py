@@ -19,6 +19,7 @@ from tests.support.whole.reference.layouts import (
     Slot,
     Test,
     Value,
+    most_bytes,
     size_of,
 )
 
@@ -190,6 +191,9 @@ def _encoded(slots: Sequence[Slot], slot: Slot, values: Mapping[str, Raw]) -> by
     if isinstance(kind, Run):
         return _encoded_run(kind, values[slot.name])
     if slot.role == "count":
+        if cases := [each for each in slots if each.choice == slot.counts]:
+            size = sum(len(_encoded(slots, each, values)) for each in cases if values[each.name] is not None)
+            return put(kind.pieces, _held(slot, kind, size))
         counted = next(each.kind for each in slots if each.name == slot.counts)
         return put(kind.pieces, _told(slot, kind, counted, values[slot.counts]))
     return _put(kind, _number(kind, values[slot.name]) if slot.role == "value" else kind.default)
@@ -212,6 +216,11 @@ def _told(slot: Slot, number: Number, counted: Kind, given: Raw) -> int:
     told = counted.bytes_of(len(given)) if slot.counts_in == "bytes" else len(given)
     if isinstance(counted, Records) and slot.counts_in == "bytes" and not counted.record.constant:
         told = len(_encoded_records(counted, given))
+    return _held(slot, number, told)
+
+
+def _held(slot: Slot, number: Number, told: int) -> int:
+    """A count with what it counts beside. Raises Wrong if it does not fit."""
     told = (told + slot.more) // slot.scale
     if told >= 1 << number.bits - number.signed:
         raise Wrong("range", "a count")
@@ -351,12 +360,22 @@ class _Walk:
     def run(self, at: int, end: int) -> tuple[dict[str, Raw], int]:
         """The values, and the offset of the end."""
         values: dict[str, Raw] = {}
-        for segment in _segments(self.slots):
-            first, left = segment[0], end - at
+        limit, choice = end, ""
+        for segment in [*_segments(self.slots), []]:
+            after = segment[0].choice if segment else ""
+            if after != choice:
+                if choice in self._sizes and at != limit:
+                    raise Wrong("length", choice)
+                limit, choice = at + self._sizes[after] if after in self._sizes else end, after
+            if limit > end:
+                raise Wrong("length", choice)
+            if not segment:
+                break
+            first, left = segment[0], limit - at
             if not (left > 0 if first.optional else holds(first, self.numbers)):
                 values |= dict.fromkeys(name for name, _ in first.values())
             elif first.walked:
-                values[first.name], at = self._records(first, at, end)
+                values[first.name], at = self._records(first, at, limit)
             else:
                 found, at = self._plain(segment, at, left)
                 values |= found
@@ -366,7 +385,7 @@ class _Walk:
         first, values = segment[0], dict[str, Raw]()
         sizes = [_size(slot, self._counted) for slot in segment]
         if isinstance(first.kind, Run) and first.kind.end:
-            sizes = [_ended(first.kind, self._payload[at:])]
+            sizes = [_ended(first.kind, self._payload[at : at + left])]
         elif sizes == [None]:
             sizes = [left - self._behind(first)]
             _demand(first.kind, sizes[0] or 0)
@@ -388,19 +407,28 @@ class _Walk:
         return values, at
 
     def _behind(self, slot: Slot) -> int:
+        if slot.choice in self._sizes:
+            return 0
         behind = self.slots[self.slots.index(slot) + 1 :]
         return _behind([each for each in behind if not each.conditional], self._counted)
 
     def _count(self, slot: Slot, data: bytes) -> None:
+        if cases := [each for each in self.slots if each.choice == slot.counts]:
+            assert isinstance(slot.kind, Number)
+            self._sized(slot, slot.kind, data, 0, min(most_bytes(cases), self._most))
+            return
         counted = next(each for each in self.slots if each.name == slot.counts)
         if slot.counts_in != "bytes" or not counted.walked:
             _note(self.slots, slot, data, self._counted)
             return
         assert isinstance(slot.kind, Number)
         assert isinstance(counted.kind, Records)
-        size = get(slot.kind.pieces, data) - slot.more
-        most = min(counted.most_bytes, self._most)
-        if not counted.least_bytes <= size <= most or size != self._sizes.setdefault(slot.counts, size):
+        self._sized(slot, slot.kind, data, counted.least_bytes, min(counted.most_bytes, self._most))
+
+    def _sized(self, slot: Slot, number: Number, data: bytes, least: int, most: int) -> None:
+        """Take the bytes of records or of a choice from a count."""
+        size = get(number.pieces, data) - slot.more
+        if not least <= size <= most or size != self._sizes.setdefault(slot.counts, size):
             raise Wrong("length", f"size {size}")
 
     def _records(self, slot: Slot, at: int, end: int) -> tuple[Raw, int]:

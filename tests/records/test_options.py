@@ -1,0 +1,156 @@
+"""Choices and terminated texts in records, and counts of choices, in the interpreter and generated code."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import pytest
+from construct import ConstructError
+
+from qlinkgen.backends import construct, python
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.content import BadContent, Raw, Unsendable, measure, pack, unpack
+from qlinkgen.plan.payload import PayloadPlan
+from qlinkgen.schema import loads
+
+SCHEMA = """
+qlinkgen: 1
+protocol: {name: chosen, title: Chosen, revision: "1", source: Example}
+byteorder: big
+types:
+  option:
+    fields:
+      kind: u8
+      size: {type: u8, counts: [kind, size, value]}
+      value:
+        switch: kind
+        cases:
+          1: {mru: {type: u16, range: 64..1500}}
+          5: u32
+          6: {}
+          7: "u16[0..2]"
+          8: {number: u8, name: {type: "text[1..4]", terminator: 00}}
+        default: "bytes[0..4]"
+  advert:
+    fields:
+      size: {type: u8, counts: [tag, data]}
+      tag: u8
+      data: {switch: tag, cases: {1: u8}, default: bytes}
+frame:
+  parts:
+    sync: B5 62
+    length: {type: u16, counts: data}
+    number: {role: message, type: u8}
+    data: {role: payload, size: 0..40}
+    check: {type: u16, algorithm: crc-16/modbus, over: [length, number, data]}
+bus: {kind: master_slave}
+defaults: {repeat: safe}
+commands:
+  options:
+    id: 1
+    request: {options: "option[0..5]"}
+    response: {size: {type: u8, counts: options, counts_in: bytes}, options: "option[0..5]", end: u8}
+  adverts:
+    id: 2
+    request: {adverts: "advert[0..9]"}
+    response:
+      kind: u8
+      size: {type: u8, counts: value}
+      value: {switch: kind, cases: {1: u16, 2: option}, default: {}}
+      end: u8
+"""
+MRU: dict[str, Raw] = {"kind": 1, "value": {"mru": 1500}}
+MAGIC: dict[str, Raw] = {"kind": 5, "value": 7}
+NAMED: dict[str, Raw] = {"kind": 8, "value": {"number": 2, "name": b"ab"}}
+OTHER: dict[str, Raw] = {"kind": 9, "value": b"\xaa"}
+CASES: list[tuple[str, dict[str, Raw], str]] = [
+    ("options.request", {"options": [MRU, MAGIC, OTHER]}, "0104 05DC 0506 00000007 0903 AA"),
+    ("options.request", {"options": [NAMED, {"kind": 6, "value": None}]}, "0806 02 616200 0602"),
+    ("options.response", {"options": [{"kind": 7, "value": [1, 2]}], "end": 3}, "06 0706 0001 0002 03"),
+    ("adverts.request", {"adverts": [{"tag": 1, "data": 4}, {"tag": 9, "data": b""}]}, "02 01 04 01 09"),
+    ("adverts.response", {"kind": 2, "value": MRU, "end": 3}, "02 04 0104 05DC 03"),
+    ("adverts.response", {"kind": 7, "value": None, "end": 3}, "07 00 03"),
+]
+WRONG = [
+    ("options.request", "0103 05", "length"),
+    ("options.request", "0105 05DC 00", "length"),
+    ("options.request", "0105 0000 00", "range"),
+    ("options.request", "0104 0000", "range"),
+    ("options.request", "0105 05DC", "length"),
+    ("options.request", "0603 00", "length"),
+    ("options.request", "0705 0001 00", "length"),
+    ("options.request", "0805 02 6162 00", "length"),
+    ("options.request", "0806 02 00 6162", "length"),
+    ("options.request", "0101", "length"),
+    ("options.request", "0907 0000000000", "length"),
+    ("options.response", "05 0706 0001 0002 03", "length"),
+    ("adverts.response", "07 01 00 03", "length"),
+    ("adverts.response", "02 05 0104 05DC 03", "length"),
+]
+
+
+@cache
+def protocol() -> Protocol:
+    found, faults = loads(SCHEMA, "chosen.yaml")
+    assert found is not None, faults
+    return found
+
+
+def payload_of(name: str) -> PayloadPlan:
+    return plan_of(protocol()).message(name).payload
+
+
+@cache
+def module() -> Any:
+    return python.load(protocol())
+
+
+@cache
+def live() -> construct.Live:
+    return construct.live(protocol())
+
+
+@pytest.mark.parametrize(("name", "values", "data"), CASES)
+def test_both_ways(name: str, values: dict[str, Raw], data: str) -> None:
+    payload, wire = payload_of(name), bytes.fromhex(data)
+    assert pack(payload, values) == wire
+    assert unpack(payload, wire) == values
+    assert module().MESSAGES[name].from_bytes(wire).to_bytes() == wire
+    assert live().payload(name, live().messages[name].parse(wire)) == wire
+    assert measure(payload_of("adverts.response"), b"\x02\x04") == 7
+
+
+@pytest.mark.parametrize(("name", "data", "kind"), WRONG)
+def test_wrong_payloads(name: str, data: str, kind: str) -> None:
+    wire = bytes.fromhex(data)
+    with pytest.raises(BadContent) as caught:
+        unpack(payload_of(name), wire)
+    assert caught.value.kind == kind
+    with pytest.raises(module().DecodeError) as refused:
+        module().MESSAGES[name].from_bytes(wire)
+    assert refused.value.kind == kind
+    with pytest.raises(ConstructError):
+        live().messages[name].parse(wire)
+
+
+def test_faults_name_the_choice_in_its_record() -> None:
+    wire = bytes.fromhex("0602 0104 0000")
+    with pytest.raises(BadContent) as caught:
+        unpack(payload_of("options.request"), wire)
+    assert (caught.value.field, caught.value.offset) == ("options[1].value.mru", 4)
+    with pytest.raises(module().DecodeError) as refused:
+        module().MESSAGES["options.request"].from_bytes(wire)
+    assert (refused.value.field, refused.value.offset) == ("options[1].value.mru", 4)
+
+
+def test_encoders_refuse_the_value_of_another_case() -> None:
+    option = module().Option
+    with pytest.raises(module().EncodeError, match="value"):
+        option(kind=1, value=5).to_bytes()
+    with pytest.raises(module().EncodeError, match="value"):
+        option(kind=6, value=5).to_bytes()
+    with pytest.raises(Unsendable) as caught:
+        pack(payload_of("options.request"), {"options": [MRU, {"kind": 6, "value": 5}]})
+    assert caught.value.field == "options[1].value"
