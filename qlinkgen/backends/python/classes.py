@@ -111,9 +111,12 @@ class ClassBuilder:
 
     def _within(self, message: MessagePlan) -> Place:
         """The place of a message: the frames of its direction or kind, or no frame for a record."""
-        if self._plan.frame.kinds:
-            return self._place.within(message.envelope) if message.frames else self._place
-        return self._place.within(self._plan.frames[message.direction].envelope)
+        if not message.frames:
+            return self._place
+        several = self._plan.frame.kinds
+        return self._place.within(
+            message.envelope if several else self._plan.frames[message.direction].envelope
+        )
 
     @property
     def scales(self) -> list[str]:
