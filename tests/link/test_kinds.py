@@ -98,3 +98,16 @@ def test_requests_are_numbered_in_the_kinds_that_have_a_counter() -> None:
     wire_bytes = counted.ReadResponse(level=-1.5, value=258).to_frame()
     assert wire_bytes == bytes.fromhex("68 09 FD 01 02 0D")
     assert counted.decode_response(wire_bytes) == counted.ReadResponse(level=-1.5, value=258)
+
+
+def test_another_crc_replaces_those_of_all_kinds() -> None:
+    vesc, other = load_codec(load(find("vesc"))), load_codec(load(find("vesc"), crc="crc-16/modbus"))
+    codec = vesc.Codec("crc-16/modbus")
+    for size in (53, 300):
+        payload = bytes(range(256)) * 2
+        wire = codec.encode(vesc.GetValuesResponse.from_bytes(payload[:size]))
+        assert wire == other.GetValuesResponse.from_bytes(payload[:size]).to_frame()
+        assert codec.decode_response(wire).to_bytes() == payload[:size]
+        assert [each.to_bytes() for each in codec.StreamDecoder("response").feed(wire)] == [payload[:size]]
+        with pytest.raises(vesc.DecodeError, match="received checksum"):
+            vesc.decode_response(wire)

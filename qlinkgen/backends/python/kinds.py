@@ -10,7 +10,7 @@ from qlinkgen.backends.python import integers, pieces, values
 from qlinkgen.backends.python.decode import Decoder
 from qlinkgen.backends.python.encode import Encoder
 from qlinkgen.backends.python.frame_checks import check_view, placed, seed_name
-from qlinkgen.backends.python.frame_views import FrameView, PlacedCheck
+from qlinkgen.backends.python.frame_views import CheckView, FrameView, PlacedCheck
 from qlinkgen.backends.python.layout import in_hex, literal
 from qlinkgen.backends.python.names import attribute, natural
 from qlinkgen.backends.python.place import Place
@@ -118,7 +118,7 @@ class KindsView:
         shift: bits of the numbers of messages in frames.
         measured: the message gives the size of some kinds.
         idle: as for other frames.
-        check: no algorithm can be replaced.
+        check: the algorithm that another can replace, in all kinds that have a check value; None without one.
         values: the values of frames of any kind.
         slots: the names of attributes of all messages.
         seeds: attributes of message classes that check values cover.
@@ -137,9 +137,9 @@ class KindsView:
     slots: Sequence[str]
     seeds: Sequence[str]
     counted: bool
+    check: CheckView | None
 
     template = "kinds"
-    check = None
     idle = None
 
 
@@ -170,8 +170,15 @@ def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
         slots=sorted([*([address.name] if name else []), *map(attribute, plan.frame.values)], key=natural),
         seeds=sorted({seed_name(seed) for each in plan.frame.kinds for seed in _seeds(each)}),
         counted=plan.protocol.counter is not None,
+        check=_selectable(list(views.values())),
         makers=frozenset(check.view.maker for view in views.values() for check in view.checks),
     )
+
+
+def _selectable(kinds: Sequence[KindView]) -> CheckView | None:
+    """The main check value of the first kind that has one, if that of each can be replaced."""
+    found = [check.view for kind in kinds for check in kind.checks if check.main]
+    return found[0] if found and all(view.selectable for view in found) else None
 
 
 def _value(member: Member, place: Place) -> ValueView:
