@@ -29,7 +29,7 @@ class OfCommand(NamedTuple):
         name: its name.
         spec: its mapping.
         path: its place.
-        shared: it has a number of its own for all commands, so that it is one message.
+        shared: it has a number of its own for all commands, or a frame without any, so it is one message.
     """
 
     name: str
@@ -48,10 +48,20 @@ def written_replies(file: SchemaFile, command: str) -> Iterator[OfCommand]:
     own = file.commands[command].replies
     for name, spec in file.replies.items():
         if name not in own:
-            shared = spec.id is not None and not spec.id.relative
+            shared = _is_anonymous(file, spec) if spec.id is None else not spec.id.relative
             yield OfCommand(name, spec, ("replies", name), shared)
     for name, spec in own.items():
         yield OfCommand(name, spec, ("commands", command, "replies", name), shared=False)
+
+
+def _is_anonymous(file: SchemaFile, spec: ReplySpec) -> bool:
+    """Whether a reply names a kind of frame without a message id."""
+    kind = file.frames.get(spec.frame or "")
+    if kind is None:
+        return False
+    roles: set[str | None] = {each.told for each in kind.parts.values()}
+    roles |= {bits.role for each in kind.parts.values() for bits in (each.bits or {}).values()}
+    return "message" not in roles
 
 
 def reply_messages(file: SchemaFile) -> Iterator[tuple[str, Path]]:

@@ -7,6 +7,7 @@ from types import ModuleType
 import pytest
 
 from qlinkgen.backends.python import load as load_codec
+from qlinkgen.errors import Refused
 from qlinkgen.link import MasterEngine, Monitor, SlaveEngine, Timing
 from qlinkgen.link.monitor import Asked, Replied
 from qlinkgen.schema import find, load
@@ -111,3 +112,31 @@ def test_another_crc_replaces_those_of_all_kinds() -> None:
         assert [each.to_bytes() for each in codec.StreamDecoder("response").feed(wire)] == [payload[:size]]
         with pytest.raises(vesc.DecodeError, match="received checksum"):
             vesc.decode_response(wire)
+
+
+REFUSING = """
+qlinkgen: 1
+protocol: {name: refusing, revision: "1", source: Made up}
+byteorder: big
+frames:
+  ask: {parts: {start: 10, code: {role: message, type: u8}, sum: {type: u8, algorithm: sum8, over: [code]}}}
+  ack: {parts: {byte: 79}}
+  nack: {parts: {byte: 1F}}
+bus: {kind: master_slave, baud: 9600, response_within: 50 ms}
+defaults: {frame: ask, repeat: safe}
+messages: {ack: {frame: ack, direction: response, fields: {}}}
+replies: {nack: {frame: nack, fields: {}}}
+commands: {begin: {id: 1, request: {}, response: ack}, end: {id: 2, request: {}, response: ack}}
+"""
+
+
+def test_a_byte_refuses_every_command() -> None:
+    protocol, faults = loads(REFUSING, "refusing.yaml")
+    assert protocol is not None, faults
+    codec = load_codec(protocol)
+    for request in (codec.BeginRequest(), codec.EndRequest()):
+        engine = MasterEngine(codec, Timing.of(codec, host_slack=SLACK))
+        assert drive(engine, request, [(0.02, b"\x79")]).response == codec.Ack()
+        refused = drive(MasterEngine(codec, Timing.of(codec, host_slack=SLACK)), request, [(0.02, b"\x1f")])
+        assert isinstance(refused.error, Refused)
+        assert refused.error.reply == codec.Nack()

@@ -125,6 +125,7 @@ class _Maker:
                     message["direction"] = "response"
                 found["messages"][self.words.name(taken)] = message | family.spec
         self._answered_otherwise(several, maker, found)
+        _refuse_shortly(random.Random(repr(self.rng.getstate())), several, found)
         self._seeds(
             next((each.shape for each in several.families if each.shape.seeds), several.families[0].shape),
             found,
@@ -541,6 +542,20 @@ class _Maker:
             if number not in self._ids and number != shape.end_id:
                 self._ids.add(number)
                 return number
+
+
+def _refuse_shortly(rng: random.Random, several: Kinds, found: Doc) -> None:
+    """Let a message without an id be a reply of all commands, perhaps."""
+    answered = [each for each in found["commands"].values() if each["response"] != "none"]
+    used = {each["response"] for each in answered if isinstance(each["response"], str)}
+    used |= {step.get("receive") for each in answered for step in each.get("steps", ()) if "receive" in step
+             and isinstance(step["receive"], str)}  # fmt: skip
+    short = {each.name for each in several.families if not each.shape.id_bits and not each.shape.most}
+    for name, spec in list(found["messages"].items()):
+        if answered and name not in used and spec.get("frame") in short and rng.random() < 0.6:
+            del found["messages"][name]
+            kept = {key: spec[key] for key in ("frame", "fields", "doc") if key in spec}
+            found["replies"] = {**found.get("replies", {}), name: kept}
 
 
 def _link(rng: random.Random, document: Doc) -> None:

@@ -45,7 +45,8 @@ class Kinds:
             if not isinstance(answer, str):
                 yield from self._of_command(name, merged, answer.get("frame", own), "response")
             yield from self._steps(name, merged, own)
-        for name, spec in data.get("messages", {}).items():
+        replies = {name: {"direction": "response", **each} for name, each in data.get("replies", {}).items()}
+        for name, spec in (replies | data.get("messages", {})).items():
             kinds = self._kinds(spec.get("frame"))
             built = document.single(
                 name, spec, self._document(kinds), self._fields(kinds), self._addressed(kinds)
