@@ -58,7 +58,7 @@ from qlinkgen.link.gaps import Gap
 from qlinkgen.link.health import HealthBook, HealthPolicy
 from qlinkgen.link.many import Answers
 from qlinkgen.link.master_states import MASTER_MOVES, MasterEvent, MasterState
-from qlinkgen.link.numbering import numbering_of
+from qlinkgen.link.numbering import for_master, master_of, numbering_of
 from qlinkgen.link.pending import Pending
 from qlinkgen.link.quiet import QuietLine
 from qlinkgen.link.state import Moves
@@ -121,6 +121,7 @@ class MasterEngine:
             self._decoder = AskedDecoder(codec, self._decoder, answers, self._asked)
         self._address = address_getter(codec)
         self.numbering = numbering_of(codec)
+        self._own = master_of(codec)
         self._byte_time = timing.byte_time
         self._paced = timing.paced
         self._echo = EchoCanceller(echo)
@@ -428,6 +429,9 @@ class MasterEngine:
 
     def _take_in(self, event: Framed | Fault, now: float) -> None:
         if self._echo.broken and self._is_own(event):
+            return
+        if self._own is not None and is_message(event) and not for_master(event, *self._own):
+            self._stray(event, now)
             return
         if (
             self._state is WAITING

@@ -1,6 +1,8 @@
-"""Numbers frames with the counter that they have."""
+"""Values of frames that engines fill: the counter, and those that answers repeat."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from qlinkgen.link.codec import Codec, Message
 
@@ -27,11 +29,9 @@ class Numbering:
         setattr(message, self._name, self._next)
         self._next = (self._next + 1) % self._modulus
 
-    def answer(self, request: Message, response: Message) -> None:
-        """Number an answer, if the protocol says how."""
-        if self._echo and _is_counted(request) and _is_counted(response):
-            setattr(response, self._name, getattr(request, self._name))
-        elif self.per_frame:
+    def answer(self, response: Message) -> None:
+        """Number an answer, if the protocol says how; see `repeat` for one that repeats its request."""
+        if self.per_frame and not self._echo:
             self.number(response)
 
 
@@ -48,3 +48,32 @@ def numbering_of(codec: Codec) -> Numbering | None:
         return None
     name, modulus, per_frame, echo = found
     return Numbering(name, modulus, per_frame=per_frame, echo=echo)
+
+
+def repeated_of(codec: Codec) -> tuple[str, ...]:
+    """Values of frames that the answers of a protocol repeat, such as the number of the master that asked."""
+    found: dict[str, None] = {}
+    for command in codec.COMMANDS.values():
+        several = (command.echoes, *(each.echoes for each in command.replies.values()))
+        beside: tuple[str, ...] = getattr(command.request, "PARTS", ())
+        found |= dict.fromkeys(name for echoes in several for name in echoes if name in beside)
+    return tuple(found)
+
+
+def repeat(names: Sequence[str], request: Message, response: Message) -> None:
+    """Give an answer the values of its request that it repeats, as far as both frames have them."""
+    for name in names:
+        if name in getattr(request, "PARTS", ()) and name in getattr(response, "PARTS", ()):
+            setattr(response, name, getattr(request, name))
+
+
+def master_of(codec: Codec) -> tuple[str, int] | None:
+    """The attribute of answers with the number of their master, and that number; None if requests tell it."""
+    request = next((command.request for command in codec.COMMANDS.values()), None)
+    found: tuple[str, int] | None = getattr(request, "MASTER", None)
+    return found
+
+
+def for_master(message: Message, name: str, number: int) -> bool:
+    """Whether a message is for a master."""
+    return bool(getattr(message, name, number) == number)

@@ -17,7 +17,7 @@ from qlinkgen.link.codec import (
 )
 from qlinkgen.link.echo import EchoCanceller
 from qlinkgen.link.gaps import Gap, silence_of
-from qlinkgen.link.numbering import numbering_of
+from qlinkgen.link.numbering import numbering_of, repeat, repeated_of
 from qlinkgen.link.slave_dialogue import PENDING, Answers, Handling, Refusal, SlaveDialogue
 from qlinkgen.link.unknown import unknown_requests
 
@@ -121,6 +121,7 @@ class SlaveEngine:
         self.counters = SlaveCounters()
         self._encode = codec.encode
         self.numbering = numbering_of(codec)
+        self._repeated = repeated_of(codec)
         self._broadcast = codec.BUS.broadcast
         self._addressed = codec.BUS.first_node is not None
         self._answering = {
@@ -265,8 +266,9 @@ class SlaveEngine:
         self._answer = self._further.pop(0) if several else b""
 
     def _encoded(self, request: Framed, response: Message) -> bytes:
+        repeat(self._repeated, request, response)
         if self.numbering is not None:
-            self.numbering.answer(request, response)
+            self.numbering.answer(response)
         return self._encode(response)
 
     def _check(self, request: Framed, response: Message) -> None:

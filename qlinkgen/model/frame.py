@@ -78,6 +78,11 @@ class Counting:
     echo: bool = False
 
 
+#: Whose number a value of every frame is: that of the receiver or the sender of a frame on a link, or that of
+#: the master; "" of no party.
+Party = Literal["", "destination", "source", "master"]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartBits:
     """Consecutive bits of a part.
@@ -99,6 +104,7 @@ class PartBits:
     type: Scalar | None = None
     #: It is a counter, which the runtime fills.
     counting: Counting | None = None
+    party: Party = ""
     #: They are characters, and so are ids in files.
     text: bool = False
     doc: Text = ""
@@ -299,8 +305,8 @@ class DelimitedFrame:
     @cached_property
     def id_bits(self) -> tuple[PartBits, ...]:
         """The pieces of the message id, the most significant first; a whole part is one piece."""
-        found = [bits for part in self.parts for bits in part.bits if bits.is_id]
-        return tuple(sorted(found, key=lambda each: -each.at))
+        found = {bits.name: bits for part in self.parts for bits in part.bits if bits.is_id}
+        return tuple(sorted(found.values(), key=lambda each: -each.at))
 
     @property
     def address(self) -> PartBits | None:
@@ -314,15 +320,32 @@ class DelimitedFrame:
         found = (bits for part in self.parts for bits in part.bits)
         return next((each for each in found if each.counting is not None), None)
 
+    @property
+    def master(self) -> PartBits | None:
+        """The number of the master among the values, None if there is none."""
+        found = (bits for part in self.parts for bits in part.bits)
+        return next((each for each in found if each.party == "master"), None)
+
+    @property
+    def repeated(self) -> tuple[str, ...]:
+        """Names of the values that an answer repeats."""
+        counter, master = self.counter, self.master
+        found = [counter.name] if counter and counter.counting and counter.counting.echo else []
+        if master and all(self.towards(each).master for each in get_args(Direction)):
+            found.append(master.name)
+        return tuple(found)
+
     @cached_property
     def values(self) -> tuple[Value, ...]:
         """Values of every frame, in wire order."""
-        return tuple(
-            Value(bits.name, bits.type, bits.doc or part.doc, part.field)
-            for part in self.parts
-            for bits in part.bits
-            if bits.type is not None
-        )
+        # Where each direction has a part of its own with a value of one name, the first one is taken.
+        found: dict[str, Value] = {}
+        for part in self.parts:
+            for bits in part.bits:
+                if bits.type is not None:
+                    value = Value(bits.name, bits.type, bits.doc or part.doc, part.field)
+                    found.setdefault(bits.name, value)
+        return tuple(found.values())
 
     @property
     def payload(self) -> Part:
@@ -420,6 +443,11 @@ class FrameKinds:
     def counter(self) -> PartBits | None:
         """The counter among the values, None if no kind has one."""
         return next((each.frame.counter for each in self.kinds if each.frame.counter), None)
+
+    @property
+    def repeated(self) -> tuple[str, ...]:
+        """Names of the values that an answer repeats."""
+        return next((each.frame.repeated for each in self.kinds if each.frame.repeated), ())
 
     @cached_property
     def values(self) -> tuple[Value, ...]:

@@ -124,10 +124,14 @@ class Protocol:
         return self.frame.counter if isinstance(self.frame, DelimitedFrame | FrameKinds) else None
 
     @property
+    def master(self) -> PartBits | None:
+        """The number of the master among the values of frames, None if there is none."""
+        return self.frame.master if isinstance(self.frame, DelimitedFrame) else None
+
+    @property
     def repeated(self) -> tuple[str, ...]:
         """Values of frames that answers repeat."""
-        counter = self.counter
-        return (counter.name,) if counter and counter.counting and counter.counting.echo else ()
+        return self.frame.repeated if isinstance(self.frame, DelimitedFrame | FrameKinds) else ()
 
     @property
     def part_sections(self) -> dict[str, str]:

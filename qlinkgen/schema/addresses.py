@@ -2,26 +2,42 @@
 
 from __future__ import annotations
 
-from typing import assert_never
+from typing import assert_never, get_args
 
-from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds, MarkedFrame, PacketFrame
+from qlinkgen.model.frame import (
+    DelimitedFrame,
+    Direction,
+    Frame,
+    FrameKinds,
+    MarkedFrame,
+    PacketFrame,
+    PartBits,
+)
 from qlinkgen.model.transaction import Bus
 from qlinkgen.schema.report import Reporter
 
 _NEEDS = (("bus",), ("frame",))
 
 
-def check_addresses(frame: Frame | None, bus: Bus, report: Reporter) -> None:
-    """Check nodes and broadcast address against the frame and each other."""
+def check_addresses(frame: Frame | None, bus: Bus, master: int | None, report: Reporter) -> None:
+    """Check nodes, broadcast address and number of the master against the frame and each other."""
     if frame is None:
         return
+    parties = _parties(frame)
+    if master is not None and not any(each.party == "master" for each in parties):
+        what = "'master' has no effect: no part of the frame has its number"
+        hint = "remove it, or add parts with role: destination and role: source"
+        report.error("bad-party", ("bus", "master"), what, hint, of_key=True, needs=_NEEDS)
     highest = _highest(frame)
-    if highest is None:
-        _check_unused(bus, report)
-        return
-    if bus.nodes is None:
+    on_link = [(1 << each.bits) - 1 for each in parties if each.party != "master"]
+    if highest is None and on_link:
+        highest = min(on_link)
+    elif highest is not None and bus.nodes is None:
         what = "the frame has an address, but the bus has no nodes"
         report.error("bad-addressing", ("bus",), what, "add nodes: 1..16", of_key=True, needs=_NEEDS)
+        return
+    if highest is None or bus.nodes is None:
+        _check_unused(bus, report)
         return
     if bus.nodes[1] > highest:
         what = f"node {bus.nodes[1]} does not fit the frame's address"
@@ -29,7 +45,8 @@ def check_addresses(frame: Frame | None, bus: Bus, report: Reporter) -> None:
     if isinstance(frame, MarkedFrame) and bus.nodes[0] == 0:
         what = "node address 0 is not allowed in a marked frame"
         report.error("bad-addressing", ("bus", "nodes"), what, "begin the nodes at 1", needs=_NEEDS)
-    _check_broadcast(bus, bus.nodes, highest, report)
+    called = frame.towards("request").address if isinstance(frame, DelimitedFrame) else None
+    _check_broadcast(bus, bus.nodes, (1 << called.bits) - 1 if called else highest, report)
 
 
 def _highest(frame: Frame) -> int | None:
@@ -37,12 +54,23 @@ def _highest(frame: Frame) -> int | None:
     match frame:
         case MarkedFrame():
             return frame.address_bits.mask
-        case DelimitedFrame() | FrameKinds():
+        case DelimitedFrame():
+            found = [frame.towards(each).address for each in get_args(Direction)]
+            sizes = [each.bits for each in found if each]
+            return (1 << min(sizes)) - 1 if sizes else None
+        case FrameKinds():
             return (1 << frame.address.bits) - 1 if frame.address else None
         case PacketFrame():
             return None
         case _:
             assert_never(frame)
+
+
+def _parties(frame: Frame) -> list[PartBits]:
+    """The numbers of parties among the values of a frame."""
+    if not isinstance(frame, DelimitedFrame):
+        return []
+    return [bits for part in frame.parts for bits in part.bits if bits.party]
 
 
 def _check_unused(bus: Bus, report: Reporter) -> None:

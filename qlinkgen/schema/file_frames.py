@@ -46,6 +46,8 @@ PartRole = Literal[
     "length",
     "message",
     "address",
+    "destination",
+    "source",
     "direction",
     "counter",
     "payload",
@@ -84,7 +86,7 @@ Directions = Annotated[
 class PartBitSpec(BitSpec):
     """Consecutive bits of a part of a frame: with a role, constant, or a value of every frame."""
 
-    role: Literal["message", "address", "direction", "counter"] | None = Field(
+    role: Literal["message", "address", "destination", "source", "direction", "counter"] | None = Field(
         default=None, description="What they hold, unless they are constant or a value"
     )
     per: Literal["request", "frame"] = Field(default="request", description="What a counter counts")

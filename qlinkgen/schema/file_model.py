@@ -41,6 +41,9 @@ class BusSpec(FileMapping):
     section: Text = Field(default="", description="Section of the source document that states it")
     nodes: WholeRange | None = Field(default=None, description="First..last address")
     broadcast: Id | None = Field(default=None, description="Address of all nodes at once")
+    master: Id | None = Field(
+        default=None, description="Number of the master in the destination and the source of frames"
+    )
     baud: Count | None = Field(default=None, description="Usual speed of the line in bit/s")
     bits_per_byte: Annotated[StrictInt, Field(ge=1, le=16)] = Field(
         default=10, description="Bits on the line per byte: start, data, parity and stop bits"

@@ -13,6 +13,7 @@ from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.part_conditions import PartConditions, check_conditions
 from qlinkgen.schema.part_directions import check_directions
+from qlinkgen.schema.parties import with_parties
 from qlinkgen.schema.parts import PartBuilder
 from qlinkgen.schema.pieces import MAX_ID_BITS, placed
 from qlinkgen.schema.report import Reporter, listed
@@ -153,7 +154,10 @@ class FrameBuilder:
             self._check_stuffing(parts, path, alone=alone, coded=coded_as is not None)
             insert, names, after = build_stuffing(stuffed, parts, self._parts, self._report)
             coding = (insert,), names, after
-        whole = DelimitedFrame(parts, *coding, silence, spec.doc, spec.section)
+        resolved = with_parties(parts, self._file, path, self._report)
+        if resolved is None:
+            return None
+        whole = DelimitedFrame(resolved, *coding, silence, spec.doc, spec.section)
         if not all(self._fits(whole.towards(each), path) for each in whole.ways):
             return None
         if whole.directed:

@@ -47,9 +47,9 @@ class KindMessages:
         return self._kinds.address is not None
 
     @property
-    def repeated(self) -> tuple[str, ...]:
-        """Values of the frame that answers repeat."""
-        return next((each.repeated for each in self._builders.values() if each.repeated), ())
+    def numbered(self) -> tuple[str, ...]:
+        """Counters of the frame that answers repeat."""
+        return next((each.numbered for each in self._builders.values() if each.numbered), ())
 
     @property
     def ways(self) -> PartBits | None:

@@ -157,7 +157,7 @@ def _build(
     bus = build_bus(file, report)
     check_types(file, report)
     check_references(file, report, frame)
-    check_addresses(frame, bus, report)
+    check_addresses(frame, bus, file.bus.master, report)
     FieldBuilder(file, report, types, payload_max).check_records()
     messages = message_builder(file, report, types, frame, bus)
     commands = CommandBuilder(file, report, messages, frame, bus)

@@ -94,9 +94,10 @@ class MessageBuilder:
         return isinstance(self._frame, MarkedFrame)
 
     @property
-    def repeated(self) -> tuple[str, ...]:
-        """Values of the frame that answers repeat."""
-        return self._echoed("response")
+    def numbered(self) -> tuple[str, ...]:
+        """Values of the frame that answers repeat, and of which each frame of a master has another one."""
+        counter = self._frame.counter if isinstance(self._frame, DelimitedFrame) else None
+        return (counter.name,) if counter and counter.name in self._echoed("response") else ()
 
     def directed(
         self, name: str, spec: CommandSpec, layout: Written, *, addressing: Addressing, section: str
@@ -126,9 +127,9 @@ class MessageBuilder:
 
     def _echoed(self, direction: Direction) -> tuple[str, ...]:
         """Values of the frame that an answer repeats."""
-        counter = self._frame.counter if isinstance(self._frame, DelimitedFrame) else None
-        repeats = direction == "response" and counter and counter.counting and counter.counting.echo
-        return (counter.name,) if counter and repeats else ()
+        if direction != "response" or not isinstance(self._frame, DelimitedFrame):
+            return ()
+        return self._frame.repeated
 
     def reply(
         self,

@@ -53,7 +53,7 @@ def check_names(
     check.constants(file)
     for name in file.attributes:
         check.spelling(name, ("attributes", name))
-    address = check.parts(file)
+    address = check.parts(file, frame)
     for name in file.commands:
         check.spelling(name, ("commands", name))
     for name in file.messages:
@@ -106,7 +106,7 @@ class _Checker:
         for name in file.types:
             self.spelling(name, ("types", name))
 
-    def parts(self, file: SchemaFile) -> str | None:
+    def parts(self, file: SchemaFile, frame: Frame | None) -> str | None:
         """Check the names of the parts of a frame; return the name of the address."""
         address = "address" if file.frame.marked is not None else None
         groups: list[tuple[Path, Mapping[str, PartSpec]]] = [
@@ -132,7 +132,8 @@ class _Checker:
                         self._error("name-clash", place, f"{inner} is also in {owner}", "rename one of them")
                     if bits.role == "address":
                         address = inner
-        return address
+        stated = frame.address if isinstance(frame, DelimitedFrame) else None
+        return stated.name if stated else address
 
     def steps(self, file: SchemaFile) -> None:
         for command, spec in file.commands.items():

@@ -31,7 +31,7 @@ class PartConditions(ConditionBuilder):
     def _with_condition(self, part: Part) -> Part:
         texts = self._written[part.name].when or ()
         if not texts:
-            values = (bits for bits in part.bits if bits.type is not None)
+            values = (bits for bits in part.bits if bits.type is not None and not bits.party)
             self._known |= {
                 bits.name: Value(bits.name, bits.type, bits.doc, part.field) for bits in values if bits.type
             }
@@ -58,8 +58,9 @@ class PartConditions(ConditionBuilder):
 
 
 def _holds_values(part: Part) -> bool:
-    """Whether a part holds values of a frame and nothing else; counters are not."""
-    return part.role == "bits" and all(bits.role == "value" and not bits.counting for bits in part.bits)
+    """Whether a part holds values of a frame and nothing else; counters and parties are not."""
+    roles = [bits.role == "value" and not (bits.counting or bits.party) for bits in part.bits]
+    return part.role == "bits" and all(roles)
 
 
 def check_conditions(frame: DelimitedFrame, path: Path, report: Reporter) -> None:

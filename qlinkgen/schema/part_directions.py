@@ -49,7 +49,10 @@ def check_directions(frame: DelimitedFrame, specs: Mapping[str, PartSpec], repor
                 what = f"{part.name} has nothing to {doing} in the frames of one direction"
                 report.error(_RULE, (*path, part.name, key), what, "name a part that they have", of_key=True)
         source = next((each for each in frame.parts if _follows(part, each)), None)
-        if source and source.only and source.only != part.only:
+        both = source is not None and all(
+            any(each.name == source.name for each in frame.towards(way).parts) for way in _DIRECTIONS
+        )
+        if source and source.only and source.only != part.only and not both:
             what = f"{part.name} follows from {source.name}, which only a {source.only} has"
             report.error(_RULE, (*path, part.name, "equals"), what, "give both the same if", of_key=True)
     if not report.failed:

@@ -21,7 +21,17 @@ from qlinkgen.schema.synonyms import type_hint
 from qlinkgen.schema.types import TypeBuilder
 
 _INTEGERS = {f"u{8 * size}": size for size in range(1, 9)}
-_SINGLE_ROLES = ("length", "address", "direction", "counter", "payload", "terminator", "idle")
+_SINGLE_ROLES = (
+    "length",
+    "address",
+    "destination",
+    "source",
+    "direction",
+    "counter",
+    "payload",
+    "terminator",
+    "idle",
+)
 _VALUE_KEYS = ("scale", "offset", "unit", "range", "raw_range", "default")
 _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "constant": ("value", "text", "type", "byteorder", "const"),
@@ -33,6 +43,8 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "length": ("type", "byteorder", "counts", "scale", "offset"),
     "message": ("type", "byteorder"),
     "address": ("type", "byteorder"),
+    "destination": ("type", "byteorder"),
+    "source": ("type", "byteorder"),
     "payload": ("size", "trim"),
     "checksum": ("type", "byteorder", "algorithm", "init", "over", "every", "otherwise", "sent", "as"),
     "terminator": ("value", "text", "shared"),
@@ -126,7 +138,8 @@ class PartBuilder:
             if role == "length" and not spec.counts:
                 self._lacks("counts", "add counts: [PART, ...]", path)
             self.known(spec.counts or (), names, (*path, "counts"))
-        kind: Role = "bits" if role in ("direction", "counter", "value") else role  # type: ignore[assignment]
+        values = ("direction", "counter", "value", "destination", "source")
+        kind: Role = "bits" if role in values else role  # type: ignore[assignment]
         whole = self._pieces.whole(name, spec, scalar, path) if scalar else None
         bits = self._pieces.inside(spec.bits or {}, scalar, path) if scalar and role == "bits" else ()
         if role == "constant" and scalar and whole and len(whole.constants) == 1:

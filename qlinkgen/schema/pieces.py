@@ -39,6 +39,9 @@ class PieceBuilder:
                 return PartBits(
                     name=name, role=role, shift=0, bits=scalar.bits, directions=directions, text=text
                 )
+            case "destination" | "source" as party:
+                number = self._number(name, 0, scalar, spec.doc, path)
+                return replace(number, party=party)
             case "constant":
                 constants = self._constants(spec, scalar.bits, path)
                 return PartBits(name=name, role="constant", shift=0, bits=scalar.bits, constants=constants)
@@ -123,9 +126,12 @@ class PieceBuilder:
             self._fault("not-applicable", (*path, key), what, "remove it")
         if spec.values is not None and role != "direction":
             self._fault("not-applicable", (*path, "values"), "'values' has no effect here", "remove it")
-        if role == "counter":
-            number = Scalar(bits=width, chunks=(), minimum=0, maximum=(1 << width) - 1)
-            return self._counted(self._number(name, first, number, spec.doc, path), spec, path)
+        number = Scalar(bits=width, chunks=(), minimum=0, maximum=(1 << width) - 1)
+        match role:
+            case "counter":
+                return self._counted(self._number(name, first, number, spec.doc, path), spec, path)
+            case "destination" | "source":
+                return replace(self._number(name, first, number, spec.doc, path), party=role)
         return PartBits(
             name=name,
             role=role,

@@ -333,6 +333,13 @@ _ALL = (
         "A broadcast needs an address that differs from all nodes, a node an address in the frame.",
     ),
     Rule(
+        "bad-party",
+        "The destination and the source of frames tell the node from the master.",
+        "In a request the node is the destination, in a response the source; the other one is the master, "
+        "whose number is `master` of the bus. On a link both are values of every frame. Elsewhere a frame "
+        "has both, or an address and the one that is the master.",
+    ),
+    Rule(
         "address-does-not-fit",
         "Node numbers and the broadcast address fit the frame's address.",
         "They could not be sent.",

@@ -112,7 +112,7 @@ class StepBuilder:
         """Whether a command may have steps; reports why not."""
         several = asked.addressing not in ("node", "none")
         spec, path = asked.spec, asked.path
-        echo = ", ".join(self._messages.repeated)
+        echo = ", ".join(self._messages.numbered)
         faults = {
             "many": (spec.many is not None, "it has several answers", "write each as a step, or remove many"),
             "addressing": (several, "it may be broadcast", "use addressing: node"),

@@ -258,6 +258,8 @@ class PartsView:
     head_checks: Sequence[HeadCheck]
     values: Sequence[str]
     counter: str
+    #: Attribute and number of the master where only answers have it, as a tuple; "" elsewhere.
+    master: str
     tail_tests: Sequence[str]
     conditional: Sequence[ConditionalView] = ()
 

@@ -224,6 +224,7 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
         head_checks=list(_head_checks(plan, envelope, bare=bare)),
         values=[attribute(member.name) for _, member in envelope.values],
         counter=_counter(plan),
+        master=_master(plan),
         tail_tests=[test for part in envelope.back for test in _tail_tests(envelope, part)],
         conditional=[each for place in ("before", "after") if (each := conditional_view(envelope, place))],
     )
@@ -239,6 +240,15 @@ def _counter(plan: Plan) -> str:
     """The counter of frames as a tuple, "" if there is none."""
     counter = plan.protocol.counter
     return counter_fact(counter) if counter else ""
+
+
+def _master(plan: Plan) -> str:
+    """The number of the master where only answers have it, as a tuple; "" elsewhere."""
+    found = plan.protocol.master
+    if found is None or found.name in plan.protocol.repeated:
+        return ""
+    assert found.type is not None
+    return f'("{attribute(found.name)}", {found.type.default})'
 
 
 def _trails(envelope: Envelope) -> bool:

@@ -61,7 +61,7 @@ def build(record: Record) -> bytes | None:
     camera._output = SimpleNamespace(write=sent.extend)
     getattr(camera, call[0])(*call[1])
     assert sent[0] == 0x81
-    return bytes((0x80 | record["source_"] << 4 | record["destination"],)) + sent[1:]
+    return bytes((0x80 | record["master"] << 4 | record["node"],)) + sent[1:]
 
 
 def read(wire: bytes, direction: Direction) -> Record | None:

@@ -277,7 +277,7 @@ class FieldMaker:
     def fields(self, room: Room, begun: Doc | None = None) -> Doc:
         """The fields of one message, beginning with `begun`."""
         rng = self.rng
-        taken = {self.shape.address_name, *(begun or {})}
+        taken = {*self.shape.attributes, *(begun or {})}
         made: list[tuple[str, Any]] = []
         for name, spec in (begun or {}).items():
             size = self._bytes_of(spec["type"], spec)
@@ -398,7 +398,7 @@ class FieldMaker:
 
     def texts(self, room: Room) -> Doc:
         """The fields of a message between separators; any may be empty that is optional."""
-        rng, taken = self.rng, {self.shape.address_name}
+        rng, taken = self.rng, {*self.shape.attributes}
         made: Doc = {}
         for _ in range(rng.choice((1, 2, 3, 5))):
             if rng.random() < 0.3:

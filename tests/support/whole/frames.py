@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from tests.support.whole import conditional, endings, one_way
+from tests.support.whole import conditional, endings, one_way, parties
 from tests.support.whole.endings import Ending
 from tests.support.whole.mixed import Mixture
 from tests.support.whole.reference import checks
@@ -59,11 +59,18 @@ class Shape:
     directed: bool = False
     #: Values of that part that pick replies.
     ways: list[str] = field(default_factory=list)
+    #: Number of the master, None if frames have none.
+    master: int | None = None
 
     @property
     def shares(self) -> bool:
         """Whether only their request may tell answers apart: of any size, with the same attributes."""
         return self.kind == "parts" and self.has_length and not self.trimmed and not self.seeds
+
+    @property
+    def attributes(self) -> set[str]:
+        """Names of the address and the number of the master."""
+        return {self.address_name, *(["master"] if self.master is not None else [])}
 
     def fit(self, number: int) -> int:
         """A number that can be an id."""
@@ -143,8 +150,17 @@ def _conditions(rng: random.Random, shape: Shape, *, plain: bool) -> None:
     if not shape.seeds and rng.random() < 0.2:
         one_way.add(rng, shape.frame, plain=plain)
         shape.directed = True
+    elif not plain and not shape.seeds and shape.bus == "master_slave" and rng.random() < 0.2:
+        _parties(rng, shape)
     if rng.random() < 0.5:
         conditional.add(rng, shape.frame)
+
+
+def _parties(rng: random.Random, shape: Shape) -> None:
+    """A destination and a source in place of the address, if there is one."""
+    if bits := parties.add(rng, shape.frame):
+        shape.directed, shape.address_name, shape.address_bits = True, "node", bits
+        shape.master = rng.randrange(1 << bits)
 
 
 def _shorter(rng: random.Random, spec: Doc) -> object:

@@ -25,6 +25,16 @@ def _add(rng: random.Random, frame: Doc, name: str, *, plain: bool) -> None:
     names = list(parts)
     at = _place(rng, frame, names, constant="value" in spec)
     spec["if"] = {"direction": rng.choice(("request", "response", "not request"))}
+    _insert(rng, frame, name, spec, at)
+
+
+def insert(rng: random.Random, frame: Doc, name: str, spec: Doc) -> None:
+    """Put a part somewhere into a frame."""
+    _insert(rng, frame, name, spec, _place(rng, frame, list(frame["parts"]), constant=False))
+
+
+def _insert(rng: random.Random, frame: Doc, name: str, spec: Doc, at: int) -> None:
+    parts, names = frame["parts"], list(frame["parts"])
     names.insert(at, name)
     ordered = {each: spec if each == name else parts[each] for each in names}
     if source := spec.pop("of", ""):

@@ -102,7 +102,7 @@ class _Maker:
             document |= self._kinds(several, maker, document["bus"])
         else:
             document |= self._traffic(shape, maker, document["bus"])
-        if shape.bus == "master_slave" and self.seed % _LINK == 1:
+        if shape.bus == "master_slave" and shape.master is None and self.seed % _LINK == 1:
             _link(rng, document)
         maker.forget_unused(document)
         return document
@@ -176,6 +176,8 @@ class _Maker:
         bus: Doc = {"kind": shape.bus}
         if shape.address_bits:
             bus |= self._addresses(shape)
+        if shape.master is not None:
+            bus["master"] = shape.master
         if rng.random() < 0.5:
             bus["baud"] = rng.choice((9600, 19200, 115200))
         if rng.random() < 0.3:

@@ -25,6 +25,7 @@ from tests.support.whole.reference.layouts import (
     size_of,
 )
 from tests.support.whole.reference.notation import Doc, octets, part_doc, whole_span
+from tests.support.whole.reference.parties import has_parties, told
 from tests.support.whole.reference.values import Raw, Wrong, get, holds, items_of, met, note, put
 from tests.support.whole.reference.values import check as check_range
 
@@ -188,7 +189,8 @@ class Frame:
         fields = Fields(document, 0)
         specs = {name: spec for name, spec in frame["parts"].items() if _has(spec, direction)}
         #: Some parts are only in the frames of one direction.
-        self.one_way = any(map(_directed, frame["parts"].values()))
+        self.one_way = any(map(_directed, frame["parts"].values())) or has_parties(document)
+        specs = {name: told(spec, direction, document) for name, spec in specs.items()}
         self.parts = [_among(part_of(name, spec, order, fields), specs) for name, spec in specs.items()]
         #: Tests of the values that decide whether a frame has a part, by its name.
         self.tests = {

@@ -1,0 +1,96 @@
+"""Frames with a destination and a source: masters know whom they asked, slaves who asked them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from qlinkgen.backends import python
+from qlinkgen.link import MasterEngine, SlaveEngine, Timing
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.schema.loader import loads
+from tests.link.line import drive
+
+SCHEMA = """\
+qlinkgen: 1
+protocol: {{name: sample, revision: "1", source: Made up}}
+byteorder: big
+frame:
+  parts:
+    start: FD
+    length: {{type: u8, counts: data}}
+    {parts}
+    code: {{role: message, type: u8}}
+    data: {{role: payload, size: 0..8}}
+    check: {{type: u8, algorithm: sum8, over: [length, code, data]}}
+bus: {{kind: master_slave, nodes: 1..7, broadcast: 15, master: 9, baud: 9600}}
+commands: {{set: {{id: 5, addressing: either, repeat: safe, request: {{value: u8}}, response: {{}}}}}}
+"""
+#: In the bits of one byte, or in parts of their own beside an address.
+BITS = (
+    "head: {type: u8, bits: {destination: {at: 0..3, role: destination}, source: {at: 4..7, role: source}}}"
+)
+BESIDE = "node: {role: address, type: u8}\n    host: {role: destination, type: u8, if: {direction: response}}"
+
+
+def made(parts: str) -> Any:
+    protocol, faults = loads(SCHEMA.format(parts=parts), "sample")
+    assert protocol is not None, [str(fault) for fault in faults]
+    return python.load(protocol)
+
+
+def test_the_node_is_the_destination_of_a_request_and_the_source_of_a_response() -> None:
+    protocol, _ = loads(SCHEMA.format(parts=BITS), "sample")
+    assert protocol is not None
+    codec = Codec(plan_of(protocol))
+    request = codec.encode("set.request", {"value": 1, "master": 9}, 3)
+    response = codec.encode("set.response", {"master": 9}, 3)
+    assert (request[2], response[2]) == (0x93, 0x39)
+    found = codec.decode(response, "response")
+    assert (found.address, found.beside) == (3, {"master": 9})
+    assert codec.decode(codec.encode("set.request", {"value": 1, "master": 2}, 15), "request").address == 15
+
+
+@pytest.mark.parametrize(("parts", "name"), [(BITS, "master"), (BESIDE, "host")])
+def test_a_master_takes_no_answer_to_another_one(parts: str, name: str) -> None:
+    module = made(parts)
+    engine = MasterEngine(module, Timing.of(module, host_slack=0.05))
+    request = module.SetRequest(node=3, value=1)
+    answers = [(0.03, module.SetResponse(node=3, **{name: number}).to_frame()) for number in (4, 9)]
+    run = drive(engine, request, answers, 0.0)
+    assert getattr(run.response, name) == 9
+    assert engine.total.strays == 1
+
+
+class _Node:
+    number = 3
+
+    def __init__(self, module: Any) -> None:
+        self._response = module.SetResponse
+
+    def handle(self, request: Any, now: float) -> Any:
+        return self._response(node=3)
+
+
+def test_a_slave_answers_to_the_master_that_asked() -> None:
+    module = made(BITS)
+    engine = SlaveEngine(module, _Node(module))
+    found = []
+    for number in (9, 4):
+        engine.receive(module.SetRequest(node=3, master=number, value=1).to_frame(), float(number))
+        found.append(engine.bytes_to_send(number + 0.5)[2])
+    assert found == [0x39, 0x34]
+
+
+def test_a_link_has_both_as_values() -> None:
+    text = SCHEMA.format(parts=BITS).replace("master_slave", "link").replace(" master: 9,", "")
+    protocol, faults = loads(
+        text.partition("commands:")[0] + "messages: {set: {id: 5, fields: {}}}\n", "sample"
+    )
+    assert protocol is not None, faults
+    codec = Codec(plan_of(protocol))
+    frame = codec.encode("set", {"destination": 15, "source": 7})
+    assert frame[2] == 0x7F
+    assert codec.decode(frame, "request").beside == {"destination": 15, "source": 7}
