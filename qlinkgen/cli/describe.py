@@ -7,7 +7,17 @@ from typing import assert_never
 
 from qlinkgen.model.fields import Record, Records
 from qlinkgen.model.message import Message, Value
-from qlinkgen.model.transaction import Allowance, ByCount, ByField, ByReply, ByTime, Command, Many, Reply
+from qlinkgen.model.transaction import (
+    Allowance,
+    ByCount,
+    ByEach,
+    ByField,
+    ByReply,
+    ByTime,
+    Command,
+    Many,
+    Reply,
+)
 from qlinkgen.model.values import default_of, to_json
 from qlinkgen.plan.describe import number_text, span_text
 
@@ -65,6 +75,8 @@ def many_text(many: Many) -> str:
             return f"answers until {many.reply.name}"
         case ByTime():
             return f"all answers within {time_text(many.within)}"
+        case ByEach():
+            return f"an answer of each of {many.field}{'.' + many.key if many.key else ''}"
         case _:
             assert_never(many)
 

@@ -59,6 +59,10 @@ def send_on_bus(
             click.echo(jsonlines.line(message_record(protocol, cast("Framed", refusal.reply))))
             raise
     answers = reply.response if type(reply.response) in {list, tuple} else [reply.response]
+    if type(reply.response) is dict:  # by node
+        answers = [answer for answer in reply.response.values() if answer is not None]
+        if missing := [node for node, answer in reply.response.items() if answer is None]:
+            warn(f"no answer of node {', '.join(map(str, missing))}")
     for answer in answers:
         if answer is not None:
             click.echo(jsonlines.line(message_record(protocol, answer)))

@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from qlinkgen.link.codec import Framed, Many
+from collections.abc import Sequence
+
+from qlinkgen.link.codec import Framed, Many, Message, address_of
+
+
+def nodes_asked(many: Many, request: Message) -> Sequence[int] | None:
+    """The nodes of which each sends one answer, as the request lists them; None for other ends."""
+    each: str = getattr(many, "each", "")  # of an `EachOf`
+    if not each:
+        return None
+    listed = getattr(request, each)
+    key: str = getattr(many, "key", "")
+    return [int(getattr(item, key)) for item in listed] if key else list(map(int, listed))
 
 
 class Answers:
@@ -10,14 +22,20 @@ class Answers:
 
     Attributes:
         items: the answers, oldest first.
+        nodes: the nodes of which each sends one, None if something else ends them.
     """
 
-    __slots__ = ("_last", "_many", "items")
+    __slots__ = ("_by", "_found", "_last", "_many", "items", "nodes")
 
     def __init__(self, many: Many, request: Framed) -> None:
         self._many = many
+        self.nodes = nodes_asked(many, request)
+        self._by: str = getattr(many, "by", "")
+        self._found: dict[int, Framed] = {}
         #: Number of answers, 0 if something else ends them.
         self._last = int(getattr(request, many.counted_by)) if many.counted_by else many.count
+        if self.nodes is not None:
+            self._last = len(set(self.nodes))
         self.items: list[Framed] = []
 
     @property
@@ -25,9 +43,30 @@ class Answers:
         """Whether a time ends them."""
         return self._many.within is not None
 
+    @property
+    def further(self) -> int:
+        """Number of answers after the first, whose time is known from the beginning."""
+        return 0 if self.nodes is None else self._last - 1
+
+    @property
+    def result(self) -> object:
+        """What a call returns: the answers, or that of each node that was asked, None for a missing one."""
+        if self.nodes is None:
+            return self.items
+        return {node: self._found.get(node) for node in self.nodes}
+
+    def expects(self, answer: Message) -> bool:
+        """Whether it may be one of them: of a node that was asked, and has not answered."""
+        if self.nodes is None:
+            return True
+        node = self._node(answer)
+        return node in self.nodes and node not in self._found
+
     def take(self, answer: Framed) -> bool:
         """Add an answer; return whether it is the last one."""
         self.items.append(answer)
+        if self.nodes is not None and (node := self._node(answer)) is not None:
+            self._found[node] = answer
         if self._many.until is not None:
             name, first, last = self._many.until
             return first <= int(getattr(answer, name)) <= last
@@ -36,3 +75,6 @@ class Answers:
     def ended_by(self, reply: Framed) -> bool:
         """Whether a reply follows the last answer."""
         return type(reply) is self._many.reply
+
+    def _node(self, answer: Message) -> int | None:
+        return int(getattr(answer, self._by)) if self._by else address_of(answer)

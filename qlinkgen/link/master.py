@@ -288,8 +288,9 @@ class MasterEngine:
         state = self._state
         if state is WAITING:
             if now >= self._deadline:
-                if self._answers is not None and self._answers.timed and self._answers.items:
-                    self._succeed(self._answers.items[-1], now)
+                answers = self._answers
+                if answers is not None and answers.items and self._enough(answers):
+                    self._succeed(answers.items[-1], now)
                 else:
                     self._timed_out(now)
         elif state is PROBING and self._probe.until:
@@ -297,6 +298,10 @@ class MasterEngine:
                 self._probed(found=False, now=now)
         elif state is not IDLE and self._line.failed(now):
             self._fail(BadReply, "line never became idle: unsolicited traffic", now)
+
+    def _enough(self, answers: Answers) -> bool:
+        """Whether the answers count although the time has passed: it ends them, or no attempt is left."""
+        return answers.timed or (answers.nodes is not None and not self._attempts.left)
 
     def take(self) -> Reply:
         """Return the reply of the transaction that has just ended.
@@ -361,8 +366,10 @@ class MasterEngine:
             self._go_on(self._dialogue, now, on_wire)
             return frame
         if command.many is not None:
-            self._answers = Answers(command.many, pending.request)
-            self._deadline += self.timing.duration(command.many)
+            answers = self._answers
+            if answers is None or answers.nodes is None:  # a repeat asks for those that are missing
+                self._answers = answers = Answers(command.many, pending.request)
+            self._deadline += self.timing.duration(command.many) + answers.further * command.answer_time
         self._state = _SENT[self._state]
         return frame
 
@@ -518,7 +525,7 @@ class MasterEngine:
         pending, answers = self._pending, self._answers
         if answers is None or type(message) is not pending.command.response:
             return False
-        if not pending.answered_by(message, self._address(message)):
+        if not pending.answered_by(message, self._address(message)) or not answers.expects(message):
             return False
         cut(pending.command.definition, pending.request, message)
         if answers.take(message):
@@ -527,7 +534,7 @@ class MasterEngine:
         self._state = _MORE[self._state]
         event = OtherAnswer(now, pending.node, pending.request, message, "more", self._attempts.number)
         self.events.append(event)
-        if not answers.timed:
+        if not answers.timed and answers.nodes is None:
             self._deadline = now + pending.command.answer_time
         return True
 
@@ -603,7 +610,7 @@ class MasterEngine:
         answers = self._answers
         if pending.command.sizes:
             cut(pending.command.definition, pending.request, response)
-        several: object = response if answers is None else answers.items
+        several: object = response if answers is None else answers.result
         if self._dialogue is not None and self._dialogue.ended:
             several = tuple(self._dialogue.answers)
         self._outcome = reply = attempts.reply(several, now)

@@ -235,6 +235,9 @@ class Monitor:
             return address_of(response) == address_of(pending.request)
         if pending.early(response) or not answers(pending.command, pending.request, response):
             return False
+        several = pending.answers if type(response) is pending.command.response else None
+        if several is not None and not several.expects(response):
+            return False
         accepts = self._accepts.get(pending.command.name)
         if accepts and type(response) is pending.command.response:
             return accepts(pending.request, response)
@@ -267,7 +270,8 @@ class Monitor:
             return now + self._timing.patience(pending.command, reply)
         if answers is None or type(response) is not pending.command.response or answers.take(response):
             return None
-        return pending.deadline if answers.timed else now + self._timing.deadline(pending.command, 0)
+        fixed = answers.timed or answers.nodes is not None
+        return pending.deadline if fixed else now + self._timing.deadline(pending.command, 0)
 
     def _further_in_dialogue(
         self, pending: _Pending, dialogue: Progress, response: Framed, now: float
@@ -310,6 +314,8 @@ class Monitor:
         self._asking.insert(0, pending)
         if command.many is not None:
             pending.deadline += self._timing.duration(command.many)
+        if pending.answers is not None:
+            pending.deadline += pending.answers.further * self._timing.deadline(command, 0)
         pending.answered = pending.reported = unanswerable
         if pending.dialogue is not None:
             pending.reported = pending.dialogue.sends

@@ -17,11 +17,15 @@ from qlinkgen.link.codec import (
 )
 from qlinkgen.link.echo import EchoCanceller
 from qlinkgen.link.gaps import Gap, silence_of
+from qlinkgen.link.many import nodes_asked
 from qlinkgen.link.numbering import numbering_of, repeat, repeated_of
 from qlinkgen.link.slave_dialogue import PENDING, Answers, Handling, Refusal, SlaveDialogue
 from qlinkgen.link.unknown import unknown_requests
 
 __all__ = ["PENDING", "Node", "Refusal", "SlaveCounters", "SlaveEngine"]
+
+#: Bytes that stuffing may insert into the answer of another node, and not into that of this one.
+_INSERTED = 2
 
 
 class Node(Protocol):
@@ -127,6 +131,12 @@ class SlaveEngine:
         self._answering = {
             command.request: command.addressing == "answered_broadcast" for command in codec.COMMANDS.values()
         }
+        #: Commands that each node in a list answers, in its order.
+        self._listed = {
+            each.request: each
+            for each in codec.COMMANDS.values()
+            if each.many is not None and hasattr(each.many, "each") and not getattr(each.many, "by", None)
+        }
         self._sized = {command.request: command for command in codec.COMMANDS.values() if command.sizes}
         self._dialogues = {each.request: each for each in codec.COMMANDS.values() if each.steps}
         #: Classes of the frames of masters that are only part of dialogues.
@@ -146,6 +156,7 @@ class SlaveEngine:
         self._answer = b""
         self._further: list[bytes] = []  #: answers that follow it
         self._due = 0.0
+        self._in_turn = False  #: the answer follows those of other nodes
         self._request: Framed | None = None  #: the last one for this node
 
     def receive(self, data: bytes, now: float) -> None:
@@ -187,31 +198,54 @@ class SlaveEngine:
     def _heard(self, request: Framed, now: float) -> None:
         if self._echo.active and self._echo.is_own(self._encode(request)):
             return
+        address, before = address_of(request), self._before(request)
+        if self._answer and self._in_turn and address not in (self._broadcast, self.node.number):
+            self.counters.foreign += 1  # the answer of an earlier node
+            return
         if self._unknown is not None:
             self._unknown.known()
         if self._answer:  # the master no longer waits for it, as it sends again
             self.counters.replaced += 1
             self._answer = b""
             self._further = []
-        address = address_of(request)
+        if before is None or address not in (None, self._broadcast, self.node.number):
+            self.counters.foreign += 1
+            return
         if address is not None and address == self._broadcast:
             self.counters.broadcasts += 1
             self._leave()
             response = self._handled(request, now)
             if not self._answering[type(request)]:
                 return
-        elif address is None or address == self.node.number:
+        else:
             self.counters.requests += 1
             handled = self._handled if not self._dialogues else self._in_dialogue
             response = handled(request, now)
-        else:
-            self.counters.foreign += 1
-            return
         self._request = request
+        self._in_turn = before > 0
         if response is not None and response is not PENDING:
             self._queue(request, response, now)
             inserted = self._encode(request)[-1:] != self._last
             self._due = now + self._turnaround + (self._byte_time if inserted else 0.0)
+            self._due += self._turns(request, before)
+
+    def _before(self, request: Framed) -> int | None:
+        """The number of nodes that answer before this one, None if it is not among those asked."""
+        command = self._listed.get(type(request))
+        if command is None:
+            return 0
+        assert command.many is not None
+        nodes = nodes_asked(command.many, request) or ()
+        return nodes.index(self.node.number) if self.node.number in nodes else None
+
+    def _turns(self, request: Framed, before: int) -> float:
+        """The time that earlier answers take; they have the size of this one if the request says it."""
+        if not before:
+            return 0.0
+        command = self._listed[type(request)]
+        assert command.response is not None
+        size = len(self._answer) + _INSERTED if command.sizes else command.response.MAX_WIRE_SIZE
+        return before * (size * self._byte_time + self._turnaround)
 
     def _in_dialogue(self, request: Framed, now: float) -> Answers:
         """Return the answers to a frame that may begin, continue or end a dialogue."""

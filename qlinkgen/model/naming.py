@@ -22,7 +22,7 @@ _IN_FUNCTIONS = frozenset(
 )
 #: Attributes of the classes of calls and handlers, and types of arguments.
 _IN_CALLS = frozenset(
-    """ask ask_any ask_many ask_steps tell handle number axis bool bytes float int list str
+    """ask ask_any ask_each ask_many ask_steps tell handle number axis bool bytes dict float int list str
     tuple type""".split()  # noqa: SIM905
 )
 #: Classes, constants and imports of a codec, and constants in the body of a message class.
@@ -31,7 +31,7 @@ _IN_MODULE = frozenset(
     Codec Bus OpenEnum BaseMessage ArrayRule BytesRule ConstantRule CountRule IntRule MaskRule
     ScaledRule TextRule RecordRule RecordsRule BaseRecord MaybeRule Misplaced NEW Rule OutOfRange Scale
     DecimalScale Marking Struct Decimal Self Any Callable Generator Sequence BytesLike ClassVar Final
-    Literal LayoutError
+    Literal LayoutError EachOf
     Checksum BUS COMMANDS MESSAGES RECORDS MARKING REFUSALS UNREAD UNREADABLE NAME ID FIELDS RULES
     ADDRESS EMPTY CHECKED""".split()  # noqa: SIM905
 ) | frozenset(dir(builtins))

@@ -130,8 +130,22 @@ class ByTime:
     within: Allowance
 
 
+@dataclass(frozen=True, slots=True)
+class ByEach:
+    """An answer from each node in a list of the request, of at most ``most``.
+
+    ``key`` is the field with the node in records of that list, "" if it has the nodes themselves. ``by`` is
+    the value of an answer with its node, "" for the address of its frame.
+    """
+
+    field: str
+    most: int
+    key: str = ""
+    by: str = ""
+
+
 #: The end of several answers to one request.
-Many = ByCount | ByField | ByReply | ByTime
+Many = ByCount | ByField | ByReply | ByTime | ByEach
 
 
 @dataclass(frozen=True, slots=True)

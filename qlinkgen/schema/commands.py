@@ -176,7 +176,16 @@ class CommandBuilder:
             )
             self._report.error("bad-many", place, what, "remove it", of_key=True, needs=needs)
             return None
-        return ManyBuilder(request, response, replies, self._report).build(spec.many, place)
+        return ManyBuilder(request, response, replies, self._report, address=self._address_name).build(
+            spec.many, place
+        )
+
+    @property
+    def _address_name(self) -> str:
+        """The name of the part with the address, "" without one."""
+        frame = self._frame
+        found = frame.address if isinstance(frame, DelimitedFrame | FrameKinds) else None
+        return found.name if found else ""
 
     def _section(self, spec: CommandSpec) -> str:
         return spec.section if spec.section is not None else self._file.defaults.section or ""

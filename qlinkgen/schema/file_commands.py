@@ -205,6 +205,13 @@ def _count_form(value: object) -> object:
     raise ValueError(f"{shown(value)} is not a number of answers; write 8 or request.FIELD")
 
 
+def _each_form(value: object) -> object:
+    """``request.LIST`` or ``request.LIST.FIELD``, without the first word."""
+    if isinstance(value, str) and (match := re.fullmatch(r"\s*request\.(\w+(?:\.\w+)?)\s*", value, re.ASCII)):
+        return match[1]
+    raise ValueError(f"{shown(value)} is not a list of nodes; write request.LIST, or request.LIST.FIELD")
+
+
 class ManySpec(FileMapping):
     """The end of several answers to one request: exactly one of its keys."""
 
@@ -215,6 +222,13 @@ class ManySpec(FileMapping):
         default=None, description="{FIELD: value} of the last answer, or the name of a reply after it"
     )
     within: Time | None = Field(default=None, description="Time in which answers come")
+    each: Annotated[str, BeforeValidator(_each_form)] | None = Field(
+        default=None,
+        description="Each node in a list of the request answers: request.LIST or request.LIST.FIELD",
+    )
+    by: Name | None = Field(
+        default=None, description="With each: value of an answer that is its node; default: the address"
+    )
 
 
 class ReplySpec(Fact):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from qlinkgen.model.fields import Field, FieldType, Records, values_of
 from qlinkgen.model.message import Message
-from qlinkgen.model.transaction import Allowance, ByCount, ByField, ByReply, ByTime, Many, Reply
-from qlinkgen.model.types import Enum, Scalar
+from qlinkgen.model.transaction import Allowance, ByCount, ByEach, ByField, ByReply, ByTime, Many, Reply
+from qlinkgen.model.types import Array, Blob, Enum, Scalar
 from qlinkgen.schema.file_commands import ManySpec
 from qlinkgen.schema.notation import shown, whole_range
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -19,21 +20,30 @@ class ManyBuilder:
     """Builds the end of the answers of one command."""
 
     def __init__(
-        self, request: Message, response: Message, replies: Iterable[Reply], report: Reporter
+        self, request: Message, response: Message, replies: Iterable[Reply], report: Reporter, *, address: str
     ) -> None:
-        """The end may refer to each of these messages."""
+        """The end may refer to each of these messages, and to the part with the address, "" without one."""
         self._request = request
         self._response = response
         self._replies = {reply.name: reply.message for reply in replies}
         self._report = report
+        self._address = address
 
     def build(self, spec: ManySpec, path: Path) -> Many | None:
         """The end that a command states, None if it is wrong."""
-        given = [key for key in ("count", "until", "within") if getattr(spec, key) is not None]
+        given = [key for key in ("count", "until", "within", "each") if getattr(spec, key) is not None]
         if len(given) != 1:
             what = f"the answers have {len(given)} ends" if given else "the answers have no end"
-            self._error(path, what, "write one of count, until and within")
+            self._error(path, what, "write one of count, until, within and each")
             return None
+        if spec.each is not None:
+            return self._each(spec.each, spec.by, path)
+        if spec.by is not None:
+            self._error(
+                (*path, "by"),
+                "only answers of each node in a list have by",
+                "write each: request.LIST, or remove it",
+            )
         if spec.within is not None:
             return ByTime(Allowance(spec.within.byte_times, spec.within.seconds))
         if spec.count is not None:
@@ -54,6 +64,32 @@ class ManyBuilder:
             self._error(path, what, "give it a range of numbers of answers, like 1..8")
             return None
         return ByCount(kind.maximum, count) if kind else None
+
+    def _each(self, each: str, by: str | None, path: Path) -> Many | None:
+        """A list of nodes in the request, and the value of an answer with its node."""
+        place, (name, _, key) = (*path, "each"), each.partition(".")
+        fields = {field.name: field for field in self._request.fields}
+        field = fields.get(name)
+        if field is None:
+            hint = did_you_mean(name, fields, f"its fields are {listed(fields)}")
+            self._error(place, f"the request has no field {shown(name)}", hint)
+            return None
+        most = _most_nodes(field, key)
+        if not most:
+            what = f"{shown(each)} of the request is not a list of plain numbers"
+            self._error(place, what, "use an array, bytes, or LIST.FIELD of an array of records")
+            return None
+        if field.conditional or field.min_size == 0:
+            what, hint = f"{name} of the request may be absent or empty", "let it have 1 item or more"
+            self._error(place, what, hint)
+            return None
+        if by is None and not self._response.addresses:
+            what = f"no address tells whose answer {self._response.name} is"
+            self._error(path, what, "write by: FIELD, a field of the response with the node")
+            return None
+        if by is not None and by != self._address:
+            return ByEach(name, most, key, by) if self._number(by, self._response, "response", path) else None
+        return ByEach(name, most, key)
 
     def _reply(self, name: str, path: Path) -> Many | None:
         if name in self._replies:
@@ -96,3 +132,19 @@ class ManyBuilder:
         else:
             self._error(path, f"{name} of the {where} is not a plain number", "use a whole number or an enum")
         return None
+
+
+def _most_nodes(field: Field, key: str) -> int:
+    """The most items of a list of plain numbers, 0 for what is not one."""
+    kind = field.type
+    item: FieldType | None = None
+    match kind:
+        case Blob() if not kind.text and not key:
+            return kind.length.maximum
+        case Array() if not key:
+            item = kind.item
+        case Records() if key:
+            kinds = {value.name: value.type for value in values_of(kind.layout.fields)}
+            item = kinds.get(key)
+    plain = isinstance(item, Scalar) and item.scaling is None and item.meaning is None
+    return kind.length.maximum if plain and isinstance(kind, Array | Records) else 0

@@ -361,7 +361,7 @@ _ALL = (
     ),
     Rule(
         "bad-many",
-        "Several answers to a request have one end: a number of them, a field, a reply or a time.",
+        "Several answers to a request have one end: a number of them, a field, a reply, a time or a list.",
         "Without an end a master would wait for a further answer after the last one.",
     ),
     Rule(

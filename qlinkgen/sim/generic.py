@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from qlinkgen.link.codec import Codec, Command, Framed, Many, Message
+from qlinkgen.link.many import nodes_asked
 from qlinkgen.link.slave_dialogue import Handling
 
 #: Name of a rule class of a generated module to its smallest legal value.
@@ -72,6 +73,10 @@ class GenericNode:
     ) -> list[Message]:
         """Return as few answers as there may be."""
         assert command.response is not None
+        if (nodes := nodes_asked(many, request)) is not None:
+            by: str = getattr(many, "by", "")
+            own = [{**values, by: node} for node in nodes] if by else [values]
+            return [self._answer(command.response, request, command.echoes, each) for each in own]
         if many.until is not None:
             field, first, _ = many.until
             values = {**values, field: first}

@@ -309,3 +309,13 @@ def test_a_dialogue() -> None:
         assert (
             "followed by 2 frames: transfer.place, transfer.block; pass --then OBJECT for each" in done.stderr
         )
+
+
+def test_an_answer_of_each_node() -> None:
+    schema = str(SCHEMAS / "answers.yaml")
+    with simulated(schema, "--nodes", "3,5") as (path, _):
+        asked = ("send", path, schema, "gather", "--node", "0", "nodes=5,4,3")
+        done = call(*asked, "--slack", "0.4", "--attempts", "1", "--echo", "none")
+        told = [{"message": "gather.response", "node": node, "fields": {"value": 0}} for node in (5, 3)]
+        assert objects(done.stdout) == told
+        assert "no answer of node 4" in done.stderr

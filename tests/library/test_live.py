@@ -33,12 +33,13 @@ class Device:
 
 
 @contextlib.contextmanager
-def serving(name: str, number: int, handle: Handle) -> Iterator[PtyPort]:
-    """Serve a device of a protocol on a pseudo-terminal."""
+def serving(name: str, number: int, handle: Handle, *others: int) -> Iterator[PtyPort]:
+    """Serve a device of a protocol on a pseudo-terminal, and others like it."""
     stopped = threading.Event()
     with open_pty() as port:
-        engine = SlaveEngine(described(name).module, Device(number, handle))
-        thread = threading.Thread(target=serve, args=(port, engine), kwargs={"stop": stopped.is_set})
+        codec = described(name).module
+        engines = [SlaveEngine(codec, Device(each, handle)) for each in (number, *others)]
+        thread = threading.Thread(target=serve, args=(port, *engines), kwargs={"stop": stopped.is_set})
         thread.start()
         try:
             yield port
@@ -79,6 +80,30 @@ def test_dynamixel_sdk_reads_and_writes_a_servo() -> None:
             assert table[10:12] == bytes((0x34, 0x12))
             assert packets.read1ByteTxRx(port, 3, 250)[1:] == (COMM_SUCCESS, codec.Error.DATA_RANGE)
             assert packets.write2ByteTxRx(port, 3, 199, 1) == (COMM_SUCCESS, codec.Error.DATA_RANGE)
+        finally:
+            port.closePort()
+
+
+def test_dynamixel_sdk_reads_several_servos_at_once() -> None:
+    peer("dynamixel_2")
+    from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PortHandler, Protocol2PacketHandler
+
+    codec: Any = described("dynamixel_2").module
+    numbers = iter((7, 3))  # in the order of the request
+
+    def servo(request: Any) -> Any:
+        number = next(numbers)
+        return codec.SyncReadResponse(node=number, data=bytes((number, 1)))
+
+    with serving("dynamixel_2", 7, servo, 3) as pty:
+        port = PortHandler(pty.path)
+        assert port.openPort()
+        group = GroupSyncRead(port, Protocol2PacketHandler(), 132, 2)
+        port.setPacketTimeout = lambda _: port.setPacketTimeoutMillis(1000 * PATIENCE)
+        try:
+            assert [group.addParam(number) for number in (7, 3)] == [True, True]
+            assert group.txRxPacket() == COMM_SUCCESS
+            assert [group.getData(number, 132, 2) for number in (3, 7)] == [0x0103, 0x0107]
         finally:
             port.closePort()
 

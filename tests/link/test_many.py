@@ -42,6 +42,12 @@ commands:
     many: {count: request.number}
   list: {id: 3, request: {}, response: {more: more, value: u8}, many: {until: {more: last}}}
   dump: {id: 4, request: {}, response: {value: u8}, many: {until: end}}
+  sync:
+    id: 6
+    request: {size: {type: u8, range: 1..3}, nodes: "u8[1..5]"}
+    response: {data: "bytes[request.size]"}
+    addressing: answered_broadcast
+    many: {each: request.nodes}
   scan: {id: 5, request: {}, response: {value: u8}, addressing: answered_broadcast, many: {within: 200 ms}}
 """
 SLACK = 0.002
@@ -113,6 +119,55 @@ def test_the_time_to_the_next_answer_is_that_to_the_first(log: ModuleType, engin
     run = drive(engine, log.PairRequest(node=3), [*one, *both])
     assert values(run.response) == [1, 2]  # those of the repeat alone
     assert len(run.sent) == 2
+
+
+def test_each_node_in_a_list_answers_in_any_order(log: ModuleType, engine: MasterEngine) -> None:
+    answers = {node: log.SyncResponse(node=node, data=bytes([node, 0])) for node in (2, 5, 9, 7)}
+    twice = [answers[9], answers[9], answers[7], answers[2], answers[5]]  # one too often, one of no such node
+    request = log.SyncRequest(node=0, size=2, nodes=[2, 5, 9])
+    run = drive(engine, request, arrivals(twice, step=0.004))
+    assert run.response == {2: answers[2], 5: answers[5], 9: answers[9]}
+    assert list(run.response) == [2, 5, 9]
+    assert (len(run.sent), engine.total.strays) == (1, 2)
+
+
+def test_a_repeat_asks_for_the_missing_ones_and_the_result_names_them(
+    log: ModuleType, engine: MasterEngine
+) -> None:
+    answers = {node: log.SyncResponse(node=node, data=bytes([node])) for node in (2, 5)}
+    request = log.SyncRequest(node=0, size=1, nodes=[2, 5, 9])
+    again = drive(engine, request, [*arrivals([answers[5]]), *arrivals([answers[2]], first=0.1)], attempts=2)
+    assert again.response == {2: answers[2], 5: answers[5], 9: None}
+    assert len(again.sent) == 2
+    silent = MasterEngine(log, engine.timing)
+    assert isinstance(drive(silent, request, attempts=1).error, NoReply)
+
+
+def test_slaves_answer_in_the_order_of_the_list(log: ModuleType) -> None:
+    class Each:
+        def __init__(self, number: int) -> None:
+            self.number = number
+
+        def handle(self, request: Any, now: float) -> Any:
+            return log.SyncResponse(node=self.number, data=bytes([self.number, 0, 1]))
+
+    wire = Wire(baud=9600)
+    for number in range(1, 6):
+        wire.attach(SlaveEngine(log, Each(number), baud=9600, turnaround=0.003), f"node {number}")
+    master = BlockingMaster(MasterEngine(log, Timing.of(log, host_slack=SLACK)), VirtualPort(wire))
+    found = master.transact(log.SyncRequest(node=0, size=3, nodes=[4, 1, 3, 8])).response
+    assert [each and each.node for each in found.values()] == [4, 1, 3, None]
+    assert wire.collisions == 0
+
+
+def test_a_monitor_expects_an_answer_of_each_node(log: ModuleType) -> None:
+    monitor = Monitor(log, Timing.of(log, host_slack=SLACK))
+    monitor.receive(log.SyncRequest(node=0, size=1, nodes=[2, 5]).to_frame(), 0.01)
+    for at, node in ((0.02, 5), (0.03, 5), (0.04, 2)):
+        monitor.receive(log.SyncResponse(node=node, data=b"1").to_frame(), at)
+    monitor.finish(3.0)
+    kinds = [type(event).__name__ for event in monitor.heard]
+    assert kinds == ["Asked", "Replied", "Stray", "Replied"]
 
 
 def test_a_refusal_ends_them(log: ModuleType, engine: MasterEngine) -> None:

@@ -55,6 +55,7 @@ def sync(calls: bus.MasterCalls, node: bus.NodeCalls) -> None:
     assert_type(calls.read(3, number=1, quantity=2), codec.ReadResponse | codec.ReadPartly)
     assert_type(node.log(number=1), list[codec.LogResponse])
     assert_type(node.clear(number=1), codec.Ack)
+    assert_type(calls.gather(0, number=1, nodes=[3, 4]), dict[int, codec.GatherResponse | None])
     place = codec.TransferPlace(node=3, start=1)
     told = calls.transfer(3, number=1, place=place, block=lambda _: codec.TransferBlock(node=3, data=b"1"))
     assert_type(told, tuple[codec.Ack, codec.Ack, codec.TransferWritten])
@@ -133,6 +134,7 @@ def slave_of(codec: Any, calls: Any) -> Any:
         def find(self, request: Any, now: float) -> Any:
             return [codec.FindResponse(node=self.number, serial=1000 + self.number)]
 
+        gather = staticmethod(lambda request, now: codec.GatherResponse(node=3, value=7))
         transfer = staticmethod(lambda request, now: transferring(codec, request))
 
     return Slave(3)
@@ -156,7 +158,7 @@ def test_calls_and_handlers(modules: tuple[Any, Any]) -> None:
         def ask(self, request: Any, *_: Any) -> Any:
             return master.transact(request).response
 
-        ask_many = ask_any = ask
+        ask_each = ask_many = ask_any = ask
 
         def ask_steps(self, request: Any, further: Any) -> Any:
             return master.transact(Dialogue(request, further)).response
@@ -173,6 +175,7 @@ def test_calls_and_handlers(modules: tuple[Any, Any]) -> None:
     assert pump.write(0, number=1, value=2) is None
     assert [each.entry for each in pump.log(3, number=3)] == [0, 1, 2]
     assert [each.serial for each in pump.find(0, number=1)] == [1003]
+    assert pump.gather(0, number=1, nodes=[5, 3]) == {5: None, 3: codec.GatherResponse(node=3, value=7)}
     block = codec.TransferBlock(node=3, data=b"123")
     told = pump.transfer(3, number=1, place=codec.TransferPlace(node=3, start=5), block=lambda _: block)
     assert told == (codec.Ack(node=3), codec.Ack(node=3), codec.TransferWritten(node=3, number=1, size=8))

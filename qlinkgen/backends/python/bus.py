@@ -22,7 +22,7 @@ from qlinkgen.model.fields import Value
 from qlinkgen.model.naming import file_stem, method, pascal
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line
-from qlinkgen.model.transaction import Command, Reply, Unknown
+from qlinkgen.model.transaction import ByEach, Command, Reply, Unknown
 from qlinkgen.model.types import Enum
 from qlinkgen.plan import MessagePlan, Plan, plan_of
 from qlinkgen.plan.payload import BytesStep, Holder, RecordsStep, RecordStep, by_slot
@@ -169,6 +169,8 @@ class BusView:
     nodes: str
     others: bool
     many: bool
+    #: Whether commands with several answers have one of each node in a list.
+    listed: set[bool]
     dialogues: bool
 
 
@@ -213,6 +215,7 @@ class BusModule:
             nodes=f", {self._nodes()}" if self._nodes() else "",
             others=any(each.done for each in self._transactions),
             many=any(each.command.many for each in self._transactions),
+            listed={isinstance(t.command.many, ByEach) for t in self._transactions if t.command.many},
             dialogues=any(each.command.steps for each in self._transactions),
         )
         template = templates().get_template("templates/bus.j2")
@@ -273,7 +276,9 @@ class BusModule:
         if transaction.answers:
             names[0] = f"tuple[{', '.join(self._class(each) for each in transaction.answers)}]"
         if transaction.command.many is not None:
-            names[0] = f"list[{' | '.join(names)}]"
+            found = " | ".join(names)
+            each = isinstance(transaction.command.many, ByEach)
+            names[0] = f"dict[int, {found} | None]" if each else f"list[{found}]"
         return " | ".join(names if surely else [*names, "None"])
 
     def _ask(self, call: Transaction, wait: str) -> str:
@@ -281,6 +286,7 @@ class BusModule:
         if call.answers:
             return f"return {wait}self.ask_steps(_request, [{', '.join(n for n, _ in self._further(call))}])"
         kind = "_many" if call.command.many is not None else "_any" if call.done else ""
+        kind = "_each" if isinstance(call.command.many, ByEach) else kind
         return f"return {wait}self.ask{kind}(_request, {self._asked(call)})"
 
     def _asked(self, transaction: Transaction) -> str:
@@ -374,6 +380,8 @@ class BusModule:
     def _all(self, command: Command) -> str:
         """The meaning of the broadcast address for a command."""
         everybody = self._protocol.bus.broadcast
+        if command.addressing == "answered_broadcast" and command.many:
+            return f"; or {everybody} for all of them"
         if command.addressing == "answered_broadcast":
             return f"; or {everybody} for a single node on the line with any number"
         if command.addressing != "either":
@@ -449,6 +457,8 @@ class BusModule:
         command = call.command
         arguments = ["self", f"request: {self._class(call.request)}", "now: float"]
         answer = self._answer(call, call.others)
+        if _answers_once(command) and call.response is not None:
+            answer = " | ".join([*(self._class(each) for each in (call.response, *call.others)), "None"])
         if call.answers:
             answer = " | ".join(["_Handling", *(self._class(each) for each in call.others), "None"])
         head = wrapped(f"def {call.name}(", arguments, f") -> {answer}:", 4)
@@ -462,7 +472,9 @@ class BusModule:
             doc += ["", f"The response repeats {' and '.join(command.echoes)} of the request."]
         if command.response and command.addressing == "either":
             doc += ["", "Return None for a broadcast, which is not answered."]
-        if command.many is not None:
+        if _answers_once(command):
+            doc += ["", "Each node in the list answers once, in the order of the list."]
+        elif command.many is not None:
             doc += ["", "Return a list: several answers are sent."]
         if call.others:
             names = " or ".join(self._class(each) for each in call.others)
@@ -478,9 +490,14 @@ class BusModule:
             return []
         node = [f"{self._place.address}=self.number"] if self._place.address else []
         given = [*node, *(f"{attribute(name)}={raw}" for name, raw in unknown.raws)]
-        several = call.command.many is not None
+        several = call.command.many is not None and not _answers_once(call.command)
         before, after = ("return [", ")]") if several else ("return ", ")")
         return wrapped(f"{before}{self._class(message)}(", given, after, 8)
+
+
+def _answers_once(command: Command) -> bool:
+    """Whether a node sends one of several answers."""
+    return isinstance(command.many, ByEach) and not command.many.by
 
 
 def _is_reply(reply: Reply, unknown: Unknown) -> bool:

@@ -54,6 +54,7 @@ _SHARED: Mapping[str, Sequence[str]] = {
     "_digits": ("BetweenRule", "decimal", "read_decimal", "read_hexadecimal", "start_of"),
     "_filled": ("differing",),
     "_rchoices": ("ChoiceRule",),
+    "_reach": ("EachOf",),
     "_records": (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records"),
     "_rules": ("FloatRule", "ListRule", "PaddedRule"),
     "_rvaried": ("EndedRule", _VARIED_RECORD, "read_counted", "read_ended", "read_filled", "read_one"),
@@ -221,7 +222,7 @@ class Module:
         """Imports used by the classes and by the templates of the frame."""
         plan, used = self.plan, {*self.place.used, *_PUBLIC, "BaseMessage", "as_bytes", "wrong_size"}
         used |= {"OpenEnum", "named"} if plan.enums else set()
-        used |= {"Many"} if any(each.many for each in plan.commands) else set()
+        used |= {tables.many_class(each.many) for each in plan.commands if each.many}
         used |= {"OtherReply"} if any(each.meant for each in plan.commands) else set()
         used |= (
             {"REFUSALS", "settled"} if any(each.has_codec and each.refusable for each in models) else set()
@@ -275,7 +276,7 @@ class Module:
         constants: list[Enum | Flags] = [*self.plan.enums, *self.plan.flags]
         names += [self.place.classes[each.name] for each in (*constants, *self.plan.layouts)]
         names += ["RECORDS"] if self.plan.layouts else []
-        names += ["Many"] if any(each.many for each in self.plan.commands) else []
+        names += [tables.many_class(each.many) for each in self.plan.commands if each.many]
         names += ["OtherReply"] if any(each.meant for each in self.plan.commands) else []
         names += ["BUS", "COMMANDS", "MESSAGES", "Message", "StreamDecoder", *_PUBLIC]
         names += [each.function for each in decoded]

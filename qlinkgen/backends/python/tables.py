@@ -16,6 +16,7 @@ from qlinkgen.model.transaction import (
     Allowance,
     Bus,
     ByCount,
+    ByEach,
     ByField,
     ByReply,
     ByTime,
@@ -123,7 +124,7 @@ def _answers(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
     """Arguments on the number and size of answers, and on other ones."""
     arguments = []
     if command.many is not None:
-        arguments.append(f"many=Many({_end(command.many, kept)})")
+        arguments.append(f"many={many_class(command.many)}({_end(command.many, kept)})")
     sizes = [
         f'("{attribute(name)}", "{attribute(asked)}", {_row_bits(command, name)})'
         for name, asked in command.sizes
@@ -152,6 +153,11 @@ def _row_bits(command: Command, name: str) -> int:
     return kind.item.bits if isinstance(kind, Array) and kind.whole else 0
 
 
+def many_class(many: Many) -> str:
+    """The class of the end of several answers."""
+    return "EachOf" if isinstance(many, ByEach) else "Many"
+
+
 def _end(many: Many, kept: Mapping[str, MessagePlan]) -> str:
     """The argument that states the end of several answers."""
     match many:
@@ -164,6 +170,9 @@ def _end(many: Many, kept: Mapping[str, MessagePlan]) -> str:
             return f"reply={class_name(kept[many.reply.name])}"
         case ByTime():
             return f"within={_time(many.within)}"
+        case ByEach():
+            names = [f'"{attribute(name)}"' if name else '""' for name in (many.field, many.key, many.by)]
+            return ", ".join([*names, str(many.most)])
         case _:
             assert_never(many)
 

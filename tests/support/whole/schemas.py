@@ -420,6 +420,9 @@ class _Maker:
         rng = self.rng
         if rng.random() < 0.2:
             command["many"] = rng.choice(({"count": rng.randint(1, 9)}, {"within": "20 ms"}))
+            lists = [name for name, spec in command["request"].items() if _lists(spec)]
+            if lists and shape.address_bits and rng.random() < 0.5:
+                command["many"] = {"each": f"request.{rng.choice(lists)}"}
         varies = shape.has_length and not shape.trimmed and not shape.least
         if varies and shape.most > 8 and rng.random() < 0.8:
             self._size_from_request(command, rows=not shape.groups)
@@ -558,6 +561,12 @@ def _refuse_shortly(rng: random.Random, several: Kinds, found: Doc) -> None:
             del found["messages"][name]
             kept = {key: spec[key] for key in ("frame", "fields", "doc") if key in spec}
             found["replies"] = {**found.get("replies", {}), name: kept}
+
+
+def _lists(spec: object) -> bool:
+    """Whether a field may be a list of nodes."""
+    kind = spec.get("type") if isinstance(spec, dict) and spec.keys() <= {"type", "doc", "section"} else spec
+    return re.match(r"(u\d+|bytes)\[[1-9]", str(kind)) is not None
 
 
 def _link(rng: random.Random, document: Doc) -> None:
