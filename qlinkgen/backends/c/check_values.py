@@ -180,12 +180,18 @@ class CheckWriter(Places):
         lines: list[str] = []
         for part in self.envelope.filling if self.alone is None else ():
             place = end if part in self.envelope.back else body
-            lines += self._computed(
-                part, body, payload_end, f"{self.prefix}_seeds_({self.message_id(self.sender.id)})"
-            )
-            lines += [f"    {line}" for line in put_check(part.check, place, self._at(part), "value")]
-            lines.append("}")
+            put = indented(put_check(part.check, place, self._at(part), "value"))
+            filled = [*self._computed(part, body, payload_end), *put, "}"]
+            if part in self.envelope.seeded:
+                known = f"{self.prefix}_seeds_({self.message_id(self.sender.id)})"
+                filled = self._with_seeds(known, filled)
+            lines += filled
         return lines
+
+    def _with_seeds(self, known: str, lines: list[str]) -> list[str]:
+        """Statements that use the seeds of a message, after one that refuses an id without any."""
+        unknown = refusal("seeds == NULL", f"{self.prefix.upper()}_ERROR_UNKNOWN")
+        return ["{", *indented([f"const uint8_t *const seeds = {known};", *unknown, *lines]), "}"]
 
     def judges(self, body: str, end: str, payload_end: str) -> list[str]:
         """Statements that verify the check values that are not verified before the payload."""
@@ -198,11 +204,8 @@ class CheckWriter(Places):
         if seeded:
             directed = "direction, " if self.directed else ""
             known = f"{self.prefix}_known_seeds_({directed}{self.message_id(self.number(self.envelope.id))})"
-            lines += ["{", f"    const uint8_t *const seeds = {known};"]
-            lines += indented(refusal("seeds == NULL", f"{self.prefix.upper()}_ERROR_UNKNOWN"))
-            for part in seeded:
-                lines += indented(self.judge(part, body, end, payload_end))
-            lines.append("}")
+            judged = [line for part in seeded for line in self.judge(part, body, end, payload_end)]
+            lines += self._with_seeds(known, judged)
         return lines
 
     def judge(self, part: CheckPart, body: str, end: str, payload_end: str) -> list[str]:
@@ -212,9 +215,9 @@ class CheckWriter(Places):
         wrong = refusal(test, f"{self.prefix.upper()}_ERROR_CRC")
         return [*self._computed(part, body, payload_end), *(f"    {line}" for line in wrong), "}"]
 
-    def _computed(self, part: CheckPart, body: str, payload_end: str, seeds: str = "seeds") -> list[str]:
+    def _computed(self, part: CheckPart, body: str, payload_end: str) -> list[str]:
         kind = self.algorithms[part.check.algorithm].type
-        more = f", {seeds}" if part in self.envelope.seeded else ""
+        more = ", seeds" if part in self.envelope.seeded else ""
         return ["{", f"    const {kind} value = {self._function(part)}({body}, {payload_end}{more});"]
 
 
