@@ -155,6 +155,8 @@ class Part:
     derivation: Derivation | None = None
     #: Names of the parts that a length counts.
     counts: tuple[str, ...] = ()
+    #: Number of a length that hands over to a longer one, None if it states every size.
+    otherwise: int | None = None
     #: Bytes of one step of a length, and bytes at raw 0.
     scale: int = 1
     offset: int = 0

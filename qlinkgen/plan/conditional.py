@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from qlinkgen.model.condition import Condition, Test
-from qlinkgen.plan.parts import CellPart, Part
+from qlinkgen.plan.parts import CellPart, LengthPart, Part
 from qlinkgen.plan.payload import Member
 
 
@@ -14,7 +14,7 @@ from qlinkgen.plan.payload import Member
 class Selector:
     """Bits of a part, as an unsigned number that meets a condition."""
 
-    part: CellPart
+    part: CellPart | LengthPart
     shift: int
     bits: int
     test: Test
@@ -34,17 +34,17 @@ class Selector:
 
 @dataclass(frozen=True, slots=True)
 class Conditional:
-    """Adjacent parts with values, which a frame has where values of its header meet a condition.
+    """Adjacent parts, which a frame has where values of its header meet a condition.
 
-    A frame without them has the defaults of their values.
+    They hold values, of which a frame without them has the defaults; or a length, if the first hands over.
 
     Attributes:
-        parts: the integers with the values.
+        parts: the integers with the values, or with the length.
         selectors: conditions that all hold.
         tests: the same on the values by name.
     """
 
-    parts: tuple[CellPart, ...]
+    parts: tuple[CellPart | LengthPart, ...]
     selectors: tuple[Selector, ...]
     tests: Condition
 
@@ -56,12 +56,24 @@ class Conditional:
     @property
     def values(self) -> tuple[Member, ...]:
         """The values in them."""
-        return tuple(member for part in self.parts for member in part.values)
+        cells = (part for part in self.parts if isinstance(part, CellPart))
+        return tuple(member for part in cells for member in part.values)
+
+    @property
+    def length(self) -> LengthPart | None:
+        """The length of long frames, None if the parts hold values."""
+        return next((part for part in self.parts if isinstance(part, LengthPart)), None)
+
+    @property
+    def packed(self) -> tuple[bytes, ...]:
+        """The bytes of each part with the defaults of its values."""
+        numbers = ((part, part.initial if isinstance(part, CellPart) else 0) for part in self.parts)
+        return tuple(part.integer.pack(number) for part, number in numbers)
 
     @property
     def initial(self) -> bytes:
         """The bytes of all parts with the defaults of their values."""
-        return b"".join(part.integer.pack(part.initial) for part in self.parts)
+        return b"".join(self.packed)
 
     def holds(self, cells: Mapping[str, bytes]) -> bool:
         """Whether a frame with these parts in its header has them."""
@@ -70,16 +82,21 @@ class Conditional:
 
 def conditional(parts: Iterable[Part], conditions: Mapping[str, Condition]) -> Conditional | None:
     """Those of these parts that have a condition, which is the same for all; None without any."""
-    cells = [part for part in parts if isinstance(part, CellPart)]
+    cells = [part for part in parts if isinstance(part, CellPart | LengthPart)]
     found = tuple(part for part in cells if part.name in conditions)
     if not found:
         return None
     tests = conditions[found[0].name]
-    held = {member.name: (part, member) for part in cells for member in part.values}
+    held = dict[str, tuple[CellPart | LengthPart, Member | None]]()
+    for part in cells:
+        held[part.name] = part, None
+        held |= {member.name: (part, member) for member in part.values} if isinstance(part, CellPart) else {}
     return Conditional(found, tuple(_selector(*held[test.value], test) for test in tests), tests)
 
 
-def _selector(part: CellPart, member: Member, test: Test) -> Selector:
+def _selector(part: CellPart | LengthPart, member: Member | None, test: Test) -> Selector:
+    if member is None:
+        return Selector(part, 0, part.integer.bits, test)
     ranges = (each for low, high in test.ranges for each in _unsigned(low, high, member.bits))
     return Selector(part, member.shift, member.bits, Test(test.value, tuple(ranges), test.negated))
 

@@ -412,7 +412,9 @@ def part_text(part: Part, frame: FramePlan) -> str:  # noqa: C901  # a case a pa
         case ConstantPart():
             return part.data.hex(" ").upper()
         case LengthPart():
-            return f"{_counted('payload bytes', part.bias, part.scale)}, {span_text(part.least, part.most)}"
+            more = f"; {part.otherwise} for more" if part.otherwise is not None else ""
+            counted = _counted("payload bytes", part.bias, part.scale)
+            return f"{counted}, {span_text(part.least, part.most)}{more}"
         case IdPart():
             return "message id"
         case AddressPart():

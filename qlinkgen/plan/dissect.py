@@ -202,7 +202,7 @@ class _Walk:
         """Take the parts in wire order."""
         for part in front:
             self._take(part, self._size(part))
-            if isinstance(part, LengthPart) and not self.no_preamble:
+            if isinstance(part, LengthPart) and self._size(part) and not self.no_preamble:
                 self._bound(part)
         self._identify()
         if self.message is not None:
@@ -245,9 +245,12 @@ class _Walk:
         trailer = sum(map(self._size, self.envelope.back))
         match end:
             case ByLength():
-                length = self._number_in(end.part, end.part.integer)
-                fits = length is not None and end.part.least <= length <= end.part.most
-                size = end.part.payload(length) if fits and length is not None else self._left() - trailer
+                told = end.part
+                if (before := self.envelope.before) and before.length and self._size(before.length):
+                    told = before.length
+                length = self._number_in(told, told.integer)
+                fits = length is not None and told.least <= length <= told.most
+                size = told.payload(length) if fits and length is not None else self._left() - trailer
                 if self.envelope.blocks:
                     self._take_blocks(self.envelope.blocks, max(0, size), fits=fits)
                     return
@@ -469,7 +472,7 @@ class _Walk:
 
     def _bound(self, part: LengthPart) -> None:
         number = self._number_in(part, part.integer)
-        if number is not None and not part.least <= number <= part.most:
+        if number is not None and not part.holds(number):
             self._fault("length", Rule.LENGTH, self._found(part).places[0], part, number)
 
     def _length(self, part: LengthPart) -> None:

@@ -108,7 +108,7 @@ class Envelope:
 
     @property
     def length(self) -> LengthPart | None:
-        """The length, None if there is none."""
+        """The length that each frame has, None if there is none."""
         return next((part for part in self.parts if isinstance(part, LengthPart)), None)
 
     @cached_property

@@ -359,7 +359,14 @@ def _integer_part(frame: DelimitedFrame, part: StatedPart, transparency: Transpa
         return CellPart(part.name, integer, tuple(map(_slot, part.bits)))
     bias, payload = frame.length_bias, frame.payload
     most = min(integer.maximum, (bias + transparency.most_sent(payload.max_size)) // part.scale)
-    return LengthPart(part.name, integer, bias, -(-(bias + payload.min_size) // part.scale), most, part.scale)
+    least = -(-(bias + payload.min_size) // part.scale)
+    first = frame.part("length")
+    if first and first.otherwise is not None and first.scalar:
+        if part is first:
+            most = first.scalar.maximum
+        else:
+            least = max(least, first.scalar.maximum + 1)
+    return LengthPart(part.name, integer, bias, least, most, part.scale, part.otherwise)
 
 
 def _slot(bits: PartBits) -> Slot:

@@ -38,16 +38,25 @@ class _IntegerPart:
 
 @dataclass(frozen=True, slots=True)
 class LengthPart(_IntegerPart):
-    """The number of payload bytes as sent, plus ``bias``, in steps of ``scale``; ``least`` to ``most``."""
+    """The number of payload bytes as sent, plus ``bias``, in steps of ``scale``; ``least`` to ``most``.
+
+    ``otherwise`` is the number where another length gives a size above that, None if this is the only one.
+    """
 
     bias: int
     least: int
     most: int
     scale: int = 1
+    otherwise: int | None = None
 
     def number(self, payload: int) -> int:
         """The length for a size of the payload."""
-        return (payload + self.bias) // self.scale
+        number = (payload + self.bias) // self.scale
+        return number if self.otherwise is None or number <= self.most else self.otherwise
+
+    def holds(self, number: int) -> bool:
+        """Whether a frame may have the number."""
+        return self.least <= number <= self.most or number == self.otherwise
 
     def payload(self, number: int) -> int:
         """The size of the payload for a length."""

@@ -299,7 +299,7 @@ class FrameReader:
         """Check a number of the header; returns the value of a length."""
         if isinstance(part, LengthPart):
             value = part.integer.unpack(taken.cells[part.name])
-            if not part.least <= value <= part.most:
+            if not part.holds(value):
                 raise BadFrame("length", cursor.at)
             return value
         if is_wrong(part, taken.cells):

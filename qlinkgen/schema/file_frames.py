@@ -170,7 +170,8 @@ class PartSpec(Fact):
         default=None, description="Size of the blocks of the covered part that have a checksum each: 16 bytes"
     )
     otherwise: Id | None = Field(
-        default=None, description="Value of the checksum where the covered parts are empty"
+        default=None,
+        description="Value of a checksum over nothing, or of a length where a longer one follows",
     )
     over: list[str] | None = Field(default=None, description="Parts that the checksum covers")
     sent: list[WholeRange] | None = Field(

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.frame import ATTRIBUTE, Checksum, DelimitedFrame, Frame, MarkedFrame, PacketFrame, Part
-from qlinkgen.model.types import Chunk
+from qlinkgen.model.types import Chunk, Scalar
 from qlinkgen.schema.coding import CodingBuilder
 from qlinkgen.schema.file_frames import FrameSpec, KindSpec, MarkedSpec, PartSpec
 from qlinkgen.schema.file_model import SchemaFile
@@ -344,13 +344,16 @@ class FrameBuilder:
             self._report.error("bad-frame", place, what, hint, of_key=True, needs=needs)
             return
         self._check_scale(frame, length, path)
+        if length.otherwise is not None:
+            length = next((part for part in frame.parts if part.role == "length" and part.when), length)
+        scalar = length.scalar or Scalar(bits=64, chunks=(), minimum=0, maximum=(1 << 64) - 1)
         longest = frame.length_bias + frame.payload.max_size
         if frame.stuffing and frame.checked_after:
             longest += frame.payload.max_size // len(frame.stuffing.after)
         longest = -(-longest // length.scale)
-        if longest > length.scalar.maximum:
+        if longest > scalar.maximum:
             what = f"{length.name} would be {longest} for the longest payload"
-            most = f"{length.scalar.bits} bits hold {length.scalar.maximum}"
+            most = f"{scalar.bits} bits hold {scalar.maximum}"
             hint = f"{most}; use a wider type or a shorter payload"
             self._report.error(
                 "length-does-not-fit", (*path, length.name), what, hint, of_key=True, needs=(path,)

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from qlinkgen.model.condition import Test
 from qlinkgen.model.fields import Field, Value
 from qlinkgen.model.frame import DelimitedFrame, Part
 from qlinkgen.schema.conditions import ConditionBuilder
 from qlinkgen.schema.file_frames import PartSpec
-from qlinkgen.schema.report import Reporter
+from qlinkgen.schema.notation import TestText
+from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
 
 _RULE = "part-condition"
+_LONG = "long-length"
 
 
 class PartConditions(ConditionBuilder):
@@ -23,6 +26,8 @@ class PartConditions(ConditionBuilder):
         super().__init__({}, path, report)
         self._written = specs
         self._known: dict[str, Value] = {}
+        #: Lengths with a number that hands over to a longer one, and that number.
+        self._handing: dict[str, int] = {}
 
     def added(self, parts: Sequence[Part]) -> tuple[Part, ...]:
         """The parts with their conditions."""
@@ -30,6 +35,8 @@ class PartConditions(ConditionBuilder):
 
     def _with_condition(self, part: Part) -> Part:
         texts = self._written[part.name].when or ()
+        if part.otherwise is not None:
+            self._handing[part.name] = part.otherwise
         if not texts:
             values = (bits for bits in part.bits if bits.type is not None and not bits.party)
             self._known |= {
@@ -37,11 +44,27 @@ class PartConditions(ConditionBuilder):
             }
         if not texts or any(text.field == "direction" for text in texts):
             return part
+        if part.role == "length":
+            return self._longer(part, texts)
         if not _holds_values(part):
             what = f"{part.name} holds more than values of a frame"
             self._error(part.name, "if", what, "let only parts with such values depend on others")
             return part
         return replace(part, when=self._condition(Field(part.name, part.field.type), texts, ()))
+
+    def _longer(self, part: Part, texts: Sequence[TestText]) -> Part:
+        """A length that is there where an earlier one hands over to it."""
+        (text, *others) = texts
+        number = self._handing.get(text.field)
+        first, *rest = text.wanted
+        if number is None or others or rest or text.negated or (first.first, first.last) != (number, number):
+            known = [f"{{{name}: {each}}}" for name, each in self._handing.items()]
+            what = f"no earlier length hands over to {part.name}"
+            hint = f"write if: {listed(known, 'or')}" if known else "give the length before it otherwise: 255"
+            self._report.error(_LONG, (*self._path, part.name, "if"), what, hint, of_key=True)
+            self._report.taint((*self._path, part.name, "if"))
+            return part
+        return replace(part, when=(Test(text.field, ((number, number),)),))
 
     def _values(self, field: Field, before: Sequence[Field]) -> Mapping[str, Value]:
         del field, before
@@ -67,9 +90,46 @@ def check_conditions(frame: DelimitedFrame, path: Path, report: Reporter) -> Non
     """Check that a receiver knows the size of a frame from its header."""
     if any(report.touched((*path, part.name, "if")) for part in frame.parts):
         return
+    _check_lengths(frame, path, report)
     for part in frame.conditional:
         if fault := next(_faults(frame, part), None):
             report.error(_RULE, (*path, part.name, "if"), *fault, of_key=True, needs=(path,))
+
+
+def _check_lengths(frame: DelimitedFrame, path: Path, report: Reporter) -> None:
+    """Check the two lengths of frames that may be long."""
+    lengths = [part for part in frame.parts if part.role == "length"]
+    first = next((part for part in lengths if part.otherwise is not None), None)
+    if first is None or not first.scalar:
+        return
+    longer = next((part for part in lengths if part.when), None)
+    copies = [part.name for part in frame.parts if part.derivation and part.derivation.of == first.name]
+    most = frame.length_bias + frame.payload.max_size
+    wrong = [
+        (longer is None, "no other length follows", f"add one with if: {{{first.name}: {first.otherwise}}}"),
+        (
+            longer is not None and longer.counts != first.counts,
+            "the lengths count different parts",
+            "let both count the same",
+        ),
+        (
+            any((part.scale, part.offset) != (1, 0) for part in lengths),
+            "a length counts in steps, or from an offset",
+            "remove scale and offset",
+        ),
+        (
+            most <= first.scalar.maximum,
+            f"no frame is longer than {first.name} can state",
+            "allow larger payloads",
+        ),
+        (bool(copies), f"{listed(copies)} repeats {first.name}", "remove it"),
+        (frame.payload.trim is not None, "zeros at the end of payloads are not sent", "remove trim"),
+    ]
+    for is_wrong, what, hint in wrong:
+        if is_wrong:
+            place = (*path, first.name, "otherwise")
+            report.error(_LONG, place, what, f"{hint}, or remove otherwise", of_key=True, needs=(path,))
+            return
 
 
 def _faults(frame: DelimitedFrame, part: Part) -> Iterator[tuple[str, str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
 from qlinkgen.model import checksum as catalogue
@@ -40,7 +41,7 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "direction": ("type", "byteorder", "values"),
     "value": ("type", "byteorder", *_VALUE_KEYS),
     "counter": ("type", "byteorder", "per", "echo"),
-    "length": ("type", "byteorder", "counts", "scale", "offset"),
+    "length": ("type", "byteorder", "counts", "scale", "offset", "range", "otherwise"),
     "message": ("type", "byteorder"),
     "address": ("type", "byteorder"),
     "destination": ("type", "byteorder"),
@@ -104,7 +105,8 @@ class PartBuilder:
         first: dict[str, str] = {}
         for name, role, place in _roles(specs, path):
             other = first.setdefault(role, name)
-            if role in _SINGLE_ROLES and other != name:
+            longer = role == "length" and specs[name].when is not None
+            if role in _SINGLE_ROLES and other != name and not longer:
                 what = f"{name} and {other} are both the {role}"
                 hint = "a frame has one of each role but constant, message and checksum"
                 self.fault("bad-frame", place, what, hint)
@@ -138,6 +140,8 @@ class PartBuilder:
             if role == "length" and not spec.counts:
                 self._lacks("counts", "add counts: [PART, ...]", path)
             self.known(spec.counts or (), names, (*path, "counts"))
+            if role == "length":
+                scalar = self._bounded(spec, scalar, path)
         values = ("direction", "counter", "value", "destination", "source")
         kind: Role = "bits" if role in values else role  # type: ignore[assignment]
         whole = self._pieces.whole(name, spec, scalar, path) if scalar else None
@@ -160,12 +164,30 @@ class PartBuilder:
             scalar=scalar,
             checksum=checksum,
             counts=tuple(spec.counts or ()),
+            otherwise=spec.otherwise if role == "length" else None,
             scale=self._whole(spec, "scale", 1, path) if role == "length" else 1,
             offset=self._whole(spec, "offset", 0, path) if role == "length" else 0,
             min_size=size[0],
             max_size=size[1],
             trim=spec.trim.keep if spec.trim and role == "payload" else None,
         )
+
+    def _bounded(self, spec: PartSpec, scalar: Scalar, path: Path) -> Scalar:
+        """The integer of a length; of one that hands over to a longer one, up to the last of its numbers."""
+        if spec.otherwise is None:
+            self.reject(spec, ("range",), "length without otherwise", path)
+            return scalar
+        if spec.otherwise > scalar.maximum:
+            what = f"{spec.otherwise} does not fit {scalar.bits} bits"
+            self._report.error("value-does-not-fit", (*path, "otherwise"), what, f"use 0..{scalar.maximum}")
+            return scalar
+        most = spec.range.last if spec.range else Fraction(spec.otherwise - 1)
+        if most.denominator != 1 or not 0 < most < spec.otherwise or (spec.range and spec.range.first > 0):
+            what = f"{path[-1]} is {spec.otherwise} in long frames, which others do not reach"
+            hint = f"write range: 0..{spec.otherwise - 1}, or a smaller one"
+            self._report.error("long-length", (*path, "otherwise"), what, hint, of_key=True)
+            return scalar
+        return replace(scalar, maximum=int(most))
 
     def _whole(self, spec: PartSpec, key: str, least: int, path: Path) -> int:
         """The scale or the offset of a length."""

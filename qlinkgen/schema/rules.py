@@ -167,6 +167,12 @@ _ALL = (
         "the same roles; what a part counts, covers or equals is there wherever the part is.",
     ),
     Rule(
+        "long-length",
+        "A length that hands over to a longer one has a number for that, which no shorter frame has.",
+        "The longer one counts the same, comes directly before the payload, and gives sizes that the first "
+        "one cannot state. Both count bytes, and nothing repeats the first one.",
+    ),
+    Rule(
         "part-condition",
         "A part that only some frames have holds values, and the header tells whether it is there.",
         "Values before the payload decide, and a length gives the size of the payload. Such parts come last "

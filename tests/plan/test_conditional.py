@@ -90,3 +90,51 @@ def test_each_beginning_of_a_frame_is_dissected(text: str) -> None:
         found = dissect(plan, wire[:size], "request")
         assert found.kind == "truncated"
         assert {place for span in found.spans for place in span.places} == {*range(size)}
+
+
+_LONG = """
+qlinkgen: 1
+protocol: {name: lengthy, revision: "1", source: Made up}
+byteorder: big
+frame:
+  parts:
+    start: FD
+    length: {type: u8, counts: [code, data], range: 0..3, otherwise: 255}
+    code: {role: message, type: u8}
+    long: {type: u16, counts: [code, data], if: {length: 255}}
+    data: {role: payload, size: 0..32}
+    sum: {type: u8, algorithm: sum8, over: [code, long, data]}
+bus: {kind: master_slave}
+defaults: {addressing: none, repeat: safe}
+commands:
+  go: {id: 1, request: {data: "bytes[0..32]"}, response: {}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [("", "FD 01 01 01"), ("0708", "FD 03 01 07 08 10"), ("070809", "FD FF 01 00 04 07 08 09 1D")],
+)
+def test_a_length_hands_over_to_a_longer_one(data: str, text: str) -> None:
+    protocol, faults = loads(_LONG, "lengthy.yaml")
+    assert protocol is not None
+    assert not faults
+    module, wire, codec = load(protocol), bytes.fromhex(text), Codec(plan_of(protocol))
+    assert codec.encode("go.request", {"data": bytes.fromhex(data)}) == wire
+    assert codec.decode(wire, "request").payload.hex() == data
+    assert module.GoRequest(data=bytes.fromhex(data)).to_frame() == wire
+    assert module.decode_request(wire).data.hex() == data
+    frame = construct.live(protocol).frames["request"]
+    assert frame.build(frame.parse(wire)) == wire
+
+
+@pytest.mark.parametrize("text", ["FD 04 01 07 08 09 19", "FD FF 01 00 03 07 08 13", "FD FF 01 00 22"])
+def test_a_length_says_what_only_it_can_say(text: str) -> None:
+    protocol, _ = loads(_LONG, "lengthy.yaml")
+    assert protocol is not None
+    wire, plan = bytes.fromhex(text), plan_of(protocol)
+    assert dissect(plan, wire, "request").kind == "length"
+    with pytest.raises(load(protocol).DecodeError, match="length"):
+        load(protocol).decode_request(wire)
+    with pytest.raises(ConstructError, match="length"):
+        construct.live(protocol).frames["request"].parse(wire)

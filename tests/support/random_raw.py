@@ -26,7 +26,7 @@ def random_beside(protocol: Protocol, message: Message, rng: random.Random) -> d
     found: dict[str, Raw] = {value.name: _random(value, rng) for value in protocol.beside(message)}
     numbers = {name: raw for name, raw in found.items() if isinstance(raw, int)}
     for part in protocol.frame.conditional if isinstance(protocol.frame, DelimitedFrame) else ():
-        if not all(test.holds(numbers[test.value]) for test in part.when):
+        if part.role != "length" and not all(test.holds(numbers[test.value]) for test in part.when):
             found |= {bits.name: bits.type.default for bits in part.bits if bits.type}
     return found
 

@@ -63,7 +63,7 @@ class PartWriter(CheckWriter):
             sent=holds(self, found, "wire"),
             received=holds(self, found, "body"),
             size=found.size,
-            put=[line for part in found.parts for line in self._put(part, place, "wire", "")],
+            put=[line for part in found.parts for line in self._put(part, place, "wire", "sent")],
             refused=refused(found),
         )
 
@@ -83,6 +83,8 @@ class PartWriter(CheckWriter):
             case LengthPart():
                 counted = f"{sent} {_signed(part.bias)}"
                 counted = f"({counted}) / {part.scale}U" if part.scale > 1 else counted
+                if part.otherwise is not None:
+                    counted = f"(({counted}) > {part.most}U) ? {part.otherwise}U : ({counted})"
                 total = f"({unsigned_type(part.integer.bits)})({counted})"
                 return [self.layouts.put(part.integer, place, str(at), total)]
             case IdPart():
@@ -134,7 +136,7 @@ class PartWriter(CheckWriter):
         """Statements that read the values of a received frame; those that it does not have get defaults."""
         lines = []
         others = {name for each in self.every for name in _names(each)} != _names(self.envelope)
-        if others or self.envelope.conditional:
+        if others or any(each.values for each in self.envelope.conditional):
             lines += ["{", f"    const {self.prefix}_parts_t initial = {self.prefix.upper()}_PARTS_INIT;"]
             lines += ["    frame->parts = initial;", "}"]
         for part, each in self.envelope.values:
@@ -187,17 +189,22 @@ class PartWriter(CheckWriter):
             yield "}"
 
     def late_checks(self, counted: str) -> list[str]:
-        """Statements that verify check values of a header whose size is the variable `head`."""
-        if not (self.envelope.header_checks and self.envelope.before):
+        """Statements that check the end of a header of `head` bytes: its length, its check values."""
+        before = self.envelope.before
+        if before is None or not (before.length or self.envelope.header_checks):
             return []
         upper = self.prefix.upper()
-        return [
+        lines = [
             f"if ({counted} < head) {{",
             "    *used = head;",
             f"    return {upper}_ERROR_TRUNCATED;",
             "}",
-            *self._judged_header(),
         ]
+        if before.length:
+            lines.append(f"if (head > {self.least_head}U) {{")
+            lines += [f"    {line}" for line in self._announced(before.length, all_there=True)]
+            lines.append("}")
+        return [*lines, *self._judged_header()]
 
     def _judged_header(self) -> Iterator[str]:
         for check in self.envelope.header_checks:
@@ -320,5 +327,9 @@ def length_bounds(length: LengthPart, value: str) -> str:
     """The condition for a length out of range."""
     bits = length.integer.bits
     terms = [f"{value} < {unsigned(length.least, bits)}"] if length.least else []
-    terms += [f"{value} > {unsigned(length.most, bits)}"] if length.most < length.integer.maximum else []
+    if length.otherwise is None:
+        terms += [f"{value} > {unsigned(length.most, bits)}"] if length.most < length.integer.maximum else []
+    elif (length.most + 1, length.otherwise) != (length.otherwise, length.integer.maximum):
+        other = f"({value} != {unsigned(length.otherwise, bits)})"
+        terms.append(f"({value} > {unsigned(length.most, bits)}) && {other}")
     return any_of(terms)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from construct import Construct, ValidationError
 
 from ._fields import Message
-from ._frames import Cell, Check, DelimitedFrame, Part, _Wire
+from ._frames import Cell, Check, DelimitedFrame, Length, Part, _Wire
 
 
 class Present(NamedTuple):
@@ -25,7 +25,8 @@ class Present(NamedTuple):
     def holds(self, cells: Mapping[str, bytes], integers: Mapping[str, Construct]) -> bool:
         """Whether a frame with these parts in its header has them."""
         return all(
-            any(
+            name in cells
+            and any(
                 first <= integers[name].parse(cells[name]) >> shift & mask <= last
                 for first, last in ranges
             )
@@ -48,9 +49,16 @@ class ConditionalFrame(DelimitedFrame):
     ) -> None:
         super().__init__(parts, messages, address=address, bare=bare)
         self.present = present
+        self.lengths = {part.name for part in parts if isinstance(part, Length)}
         self.integers = {
-            part.name: part.integer for part in parts if isinstance(part, Cell)
+            part.name: part.integer for part in parts if isinstance(part, Cell | Length)
         }
+
+    def _header(
+        self, part: Part, cells: Mapping[str, bytes], numbers: dict[type, int]
+    ) -> None:
+        if part.name not in self.lengths or part.name not in self._absent(cells):
+            super()._header(part, cells, numbers)
 
     def _absent(self, cells: Mapping[str, bytes]) -> dict[str, bytes]:
         """The parts that a frame with these does not have, and their bytes nevertheless."""
@@ -64,7 +72,7 @@ class ConditionalFrame(DelimitedFrame):
     def _settled(self, cells: dict[str, bytes]) -> dict[str, bytes]:
         absent = self._absent(cells)
         for name, initial in absent.items():
-            if cells[name] != initial:
+            if cells[name] != initial and name not in self.lengths:
                 raise ValidationError(f"a frame with these values does not have {name}")
         return cells | dict.fromkeys(absent, b"")
 

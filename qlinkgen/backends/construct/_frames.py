@@ -130,7 +130,7 @@ class Constant(NamedTuple):
 class Length(NamedTuple):
     """The size of the payload as sent, plus ``bias``, in steps of ``scale`` bytes.
 
-    It is from ``least`` to ``most``.
+    It is from ``least`` to ``most``, or ``otherwise`` where another length gives a size above that.
     """
 
     name: str
@@ -139,6 +139,18 @@ class Length(NamedTuple):
     least: int
     most: int
     scale: int = 1
+    otherwise: int | None = None
+
+    def number(self, payload: int) -> int:
+        """The length for a size of the payload."""
+        number = (payload + self.bias) // self.scale
+        if self.otherwise is None or number <= self.most:
+            return number
+        return self.otherwise
+
+    def holds(self, number: int) -> bool:
+        """Whether a frame may have the number."""
+        return self.least <= number <= self.most or number == self.otherwise
 
 
 class Id(NamedTuple):
@@ -481,9 +493,7 @@ class Frame(Construct):
             case Constant():
                 return part.data
             case Length():
-                return bytes(
-                    part.integer.build((len(payload) + part.bias) // part.scale)
-                )
+                return bytes(part.integer.build(part.number(len(payload))))
             case Id():
                 return bytes(part.integer.build(number))
             case Address():
@@ -759,7 +769,7 @@ class DelimitedFrame(Frame):
         """Check a part of the header."""
         if isinstance(part, Length):
             number = part.integer.parse(cells[part.name])
-            if not part.least <= number <= part.most:
+            if not part.holds(number):
                 raise FrameError(
                     "length", f"{part.name} is {number}, not {part.least}..{part.most}"
                 )

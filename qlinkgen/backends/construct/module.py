@@ -237,7 +237,8 @@ def _part(part: Part, envelope: Envelope, types: Types, algorithms: Algorithms) 
         case LengthPart():
             bounds = (("bias", part.bias), ("least", part.least), ("most", part.most))
             scale = (("scale", part.scale),) if part.scale > 1 else ()
-            return Call("Length", (part.name, integer(part.integer)), (*bounds, *scale))
+            more = (("otherwise", part.otherwise),) if part.otherwise is not None else ()
+            return Call("Length", (part.name, integer(part.integer)), (*bounds, *scale, *more))
         case IdPart():
             return Call("Id", (part.name, integer(part.integer)))
         case AddressPart():
@@ -336,9 +337,8 @@ def _present(conditional: Conditional) -> Call:
         (each.part.name, each.shift, each.mask, each.test.ranges, each.test.negated)
         for each in conditional.selectors
     )
-    initial = tuple(part.integer.pack(part.initial) for part in conditional.parts)
     names = tuple(part.name for part in conditional.parts)
-    return Call("Present", (Sequence(names), Sequence(initial), Sequence(tests)))
+    return Call("Present", (Sequence(names), Sequence(conditional.packed), Sequence(tests)))
 
 
 def _ended(

@@ -20,7 +20,8 @@ class ConditionalView:
 
     Attributes:
         place: "before" or "after", with which the name of its function ends.
-        names: attributes of messages for their values, for texts.
+        names: attributes of messages for their values, or the name of a length, for texts.
+        holds_values: they hold values, not a length.
         test: statements of a function that tells from ``head`` whether a frame has them.
         size: their bytes.
         initial: these bytes where a frame does not have them.
@@ -28,6 +29,7 @@ class ConditionalView:
 
     place: str
     names: str
+    holds_values: bool
     test: list[str]
     size: int
     initial: str
@@ -38,9 +40,16 @@ def conditional_view(envelope: Envelope, place: str) -> ConditionalView | None:
     found = envelope.before if place == "before" else envelope.after
     if found is None:
         return None
-    names = [attribute(member.name) for member in found.values]
+    names = [attribute(member.name) for member in found.values] or [each.name for each in found.parts]
     listed = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
-    return ConditionalView(place, listed, list(_tests(envelope, found)), found.size, literal(found.initial))
+    return ConditionalView(
+        place=place,
+        names=listed,
+        holds_values=found.length is None,
+        test=list(_tests(envelope, found)),
+        size=found.size,
+        initial=literal(found.initial),
+    )
 
 
 def _tests(envelope: Envelope, found: Conditional) -> Iterator[str]:

@@ -211,6 +211,8 @@ class Encoder:
         match part:
             case LengthPart():
                 size = self._size(part)
+                if part.otherwise is not None:
+                    return _handing(part, size)
                 return f"({size}) // {part.scale}" if part.scale > 1 else size
             case IdPart():
                 return self.number
@@ -504,3 +506,10 @@ class Encoder:
         self.place.use("Struct")
         self.constants += table(name, text, "pack", row.items, "n")
         return wrapped(f"{before}{name}[{row.items.name}_count](", row.arguments, ")", _INDENT)
+
+
+def _handing(part: LengthPart, size: str) -> str:
+    """The number of a length that hands over to a longer one."""
+    if size.isdecimal():
+        return str(part.number(int(size) - part.bias))
+    return f"{size} if {size} <= {part.most} else {part.otherwise}"

@@ -101,6 +101,7 @@ class LengthView:
         quick: the same value; raises an IndexError if the header is too short, unless ``sliced``.
         sliced: if the header is too short, ``quick`` is a wrong number.
         bounded: its part holds numbers beyond the bounds.
+        last: the last number that the first of two lengths states, None if there is one length.
     """
 
     bias: int
@@ -114,6 +115,7 @@ class LengthView:
     bytes: str
     scale: int
     bounded: bool
+    last: int | None = None
 
 
 @dataclass(frozen=True)

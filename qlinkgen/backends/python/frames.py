@@ -34,6 +34,7 @@ from qlinkgen.plan.check import Check
 from qlinkgen.plan.coding import Add, Escaping
 from qlinkgen.plan.ends import ByLength, ByMark, ByTerminator, Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.envelope import Envelope
+from qlinkgen.plan.expr import OneOf, Within
 from qlinkgen.plan.parts import (
     AddressPart,
     BlocksPart,
@@ -337,19 +338,24 @@ def _length_view(plan: Plan, envelope: Envelope) -> LengthView | None:
     if not isinstance(plan.frame.end, ByLength):
         return None
     part = plan.frame.end.part
+    longer = envelope.before.length if envelope.before else None
     start = envelope.offset(part)
+    value = pieces.read(envelope, part, "head") + (f" * {part.scale}" if part.scale > 1 else "")
+    if longer:
+        value = f"{pieces.read(envelope, longer, 'head')} if _has_before(head) else {value}"
     return LengthView(
         bias=part.bias,
         least=part.least * part.scale,
-        most=part.most * part.scale,
+        most=(longer or part).most * part.scale,
         start=start,
         end=start + part.size,
-        value=pieces.read(envelope, part, "head") + (f" * {part.scale}" if part.scale > 1 else ""),
+        value=value,
         quick=_quick_length(part, start),
         sliced=integers.is_sliced(part.integer),
         bytes=integers.to_bytes(part.integer, "number"),
         scale=part.scale,
         bounded=(part.least, part.most) != (0, part.integer.mask),
+        last=part.most if longer else None,
     )
 
 
@@ -401,6 +407,8 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
                 yield HeadCheck(
                     test, no_frame, "constant", f"head[{start or ''}:{end}] != {literal(part.data)}"
                 )
+            case LengthPart() if envelope.before and envelope.before.length:
+                yield _one_of_two(envelope, part, longer=part is envelope.before.length)
             case LengthPart():
                 whole = isinstance(plan.frame.transparency, FrameStuffing | Coded)
                 place = f"_take(buf, start, {end})[1]" if whole else f"start + {end}"
@@ -417,6 +425,17 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
                 raise AssertionError(f"{part.name} is not a part of a header")
             case _:
                 assert_never(part)
+
+
+def _one_of_two(envelope: Envelope, part: LengthPart, *, longer: bool) -> HeadCheck:
+    """The check of one of two lengths; the first one may hand over to the other."""
+    end, seen = envelope.offset(part) + part.size, pieces.read(envelope, part, "head")
+    legal = [Within(part.least, part.most)]
+    if part.otherwise is not None:
+        legal.append(Within(part.otherwise, part.otherwise))
+    reached = f"len(head) >= {end} and{' _has_before(head) and' if longer else ''}"
+    wrong = integers.broken(OneOf(tuple(legal)), seen)
+    return HeadCheck(f"{reached} {wrong}", f'"length", start + {end}, b""')
 
 
 def _bare_checks(envelope: Envelope, part: Part, reached: str, no_frame: str) -> Iterator[HeadCheck]:

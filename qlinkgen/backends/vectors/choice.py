@@ -101,7 +101,7 @@ class Rule:
             for part, member in envelope.values
         }
         for each in envelope.conditional:
-            if not all(test.holds(found[test.value]) for test in each.tests):
+            if each.values and not all(test.holds(found[test.value]) for test in each.tests):
                 found |= {member.name: member.number.default for member in each.values}
         return {**found}
 

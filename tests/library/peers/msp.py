@@ -13,7 +13,8 @@ from qlinkgen.model.message import Direction
 from tests.library.protocols import Record
 
 _CODES = {
-    "api_version": 1, "variant": 2, "version": 3, "motors": 104, "channels": 105, "gps": 106,
+    "api_version": 1, "variant": 2, "version": 3, "read_flash": 71, "motors": 104,
+    "channels": 105, "gps": 106,
     "attitude": 108, "altitude": 109, "analog": 110, "set_channels": 200, "set_motors": 214, "save": 250,
 }  # fmt: skip
 #: Message to its values in the library after its answer was read.
@@ -60,9 +61,16 @@ def build(record: Record) -> bytes | None:
         return None
     board, sent = _board(), io.BytesIO()
     board.conn = SimpleNamespace(write=sent.write)
-    words: list[int] = next(iter(record["fields"].values()), [])
-    board.send_RAW_msg(_CODES[name], b"".join(word.to_bytes(2, "little") for word in words))
+    board.send_RAW_msg(_CODES[name], _payload(record["fields"]))
     return sent.getvalue()
+
+
+def _payload(fields: Mapping[str, Any]) -> bytes:
+    """The data of a request: a list of words, or an address and a size."""
+    if "address" in fields:
+        return int(fields["address"]).to_bytes(4, "little") + int(fields["size"]).to_bytes(2, "little")
+    words: list[int] = next(iter(fields.values()), [])
+    return b"".join(word.to_bytes(2, "little") for word in words)
 
 
 def read(wire: bytes, direction: Direction) -> Record | None:
@@ -77,4 +85,7 @@ def read(wire: bytes, direction: Direction) -> Record | None:
     if direction == "response" and name in _VALUES and found["dataView"]:
         assert board.process_recv_data(found) >= 0  # bytes that it leaves
         fields = _VALUES[name](board)
+    if direction == "response" and name == "read_flash":
+        data = bytes(found["dataView"])
+        fields = {"address": int.from_bytes(data[:4], "little"), "data": data[7:].hex()}
     return {"message": f"{name}.{direction}", "fields": fields}

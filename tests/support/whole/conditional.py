@@ -9,7 +9,7 @@ Doc = dict[str, Any]
 
 
 #: Names of the added values, first of those before the payload.
-NAMES = ("hop_count", "zone_id", "seal", "seal_time")
+NAMES = ("hop_count", "zone_id", "seal", "seal_time", "long_size")
 
 
 def add(rng: random.Random, frame: Doc) -> None:
@@ -27,17 +27,37 @@ def add(rng: random.Random, frame: Doc) -> None:
     ordered = {**{each: parts[each] for each in names[:at]}, "conduct": conduct}
     ordered |= {each: parts[each] for each in names[at:payload]}
     before = {name: _value(rng) for name in NAMES[: rng.choice((0, 1, 2))]}
+    size = next(name for name, spec in parts.items() if "counts" in spec)
+    if rng.random() < 0.5 and (longer := _longer(rng, parts, size, parts[names[payload]])):
+        before = {"long_size": longer}
     most = rng.choice((0, 1, 2) if before else (1, 2))
     after = {name: _value(rng) for name in NAMES[2 : 2 + most]}
     for group in (before, after):
         test = rng.choice(_tests(signed=signed))
         for spec in group.values():
-            spec["if"] = test
+            spec.setdefault("if", test)
     ordered |= before | {each: parts[each] for each in names[payload:]} | after
     parts.clear()
     parts.update(ordered)
     for each in [*parts][len(names[:payload]) + 1 + len(before) :]:
         _cover(rng, parts[each], names, [*before], payload)
+
+
+def _longer(rng: random.Random, parts: Doc, size: str, payload: Doc) -> Doc:
+    """A length for long payloads, to which the first one hands over; {} if that states every size."""
+    first = parts[size]
+    repeated = any(size in str(each.get("equals", "")) for each in parts.values())
+    most = int(str(payload["size"]).split("..")[-1])
+    if "scale" in first or "offset" in first or repeated or "trim" in payload or most < 12:
+        return {}
+    top = (1 << int(first["type"][1:])) - 1
+    otherwise = rng.choice((min(top, most + 90), min(top, 255), top))
+    last = rng.choice((9, 11, most // 2)) if most < 200 or otherwise > most else otherwise - 1
+    first["otherwise"] = otherwise
+    last = min(otherwise - 1, last)
+    if last < otherwise - 1 or rng.random() < 0.5:
+        first["range"] = f"0..{last}"
+    return {"type": rng.choice(("u16", "u16", "u24")), "counts": first["counts"], "if": {size: otherwise}}
 
 
 def _tests(*, signed: bool) -> list[str | Doc]:

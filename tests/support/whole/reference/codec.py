@@ -107,7 +107,7 @@ class Reference:
         frame = self.frame_of(message.direction)
         if not isinstance(frame, Frame):
             return message
-        parts = (part for part in frame.parts if part.name in frame.tests)
+        parts = (part for part in frame.parts if part.name in frame.tests and part.values)
         depending = [(name, frame.tests[part.name]) for part in parts for name, *_ in part.values]
         return replace(message, beside=frame.beside, depending=tuple(depending))
 

@@ -198,6 +198,10 @@ class Frame:
             for name, spec in specs.items()
             if isinstance(spec, dict) and "if" in spec and not _directed(spec)
         }
+        #: The length of frames of which the first one cannot state the size.
+        self.longer = next(
+            (part for part in self.parts if part.role == "length" and part.name in self.tests), None
+        )
         self.by_role: Mapping[str, Part] = {part.role: part for part in self.parts[::-1]}
         #: Bytes of attributes of messages, by number of the message.
         self.seeds: dict[int, Mapping[str, bytes]] = {}
@@ -371,7 +375,7 @@ class Frame:
         rest = self._id_pieces(number)
         for part in self.parts:
             if part.role == "length":
-                cut[part.name] = put(part.pieces, (self.bias + len(payload)) // self.step)
+                cut[part.name] = put(part.pieces, self._length(part, (self.bias + len(payload)) // self.step))
             elif part.role == "bits":
                 raw = _bits_of_values(part, given)
                 for role, shift, _, spec in part.bits:
@@ -384,7 +388,7 @@ class Frame:
                 cut[part.name] = put(part.pieces, self.derived(part, cut))
             else:
                 cut[part.name] = payload if part.role == "payload" else part.constant
-        cut |= {**dict.fromkeys(self.lacking(given), b""), **self.seeds.get(number, {})}
+        cut |= {**dict.fromkeys(self.lacking(given, cut), b""), **self.seeds.get(number, {})}
         for _ in self.checks:  # so often that those which cover others become right
             for check in self.checks:
                 cut[check.name] = _shown(check, self.check_value(check, cut))
@@ -448,16 +452,34 @@ class Frame:
         tested = {name for name, *_ in tests}
         numbers = dict[str, int]()
         for each in self.parts if tests else ():
+            if each.name in tested and each.role == "length":
+                numbers[each.name] = get(each.pieces, cut[each.name])
             for name, shift, kind in each.values:
                 if name in tested:
                     raw = get(each.pieces, cut[each.name]) >> shift & (1 << kind.bits) - 1
                     numbers[name] = raw - ((raw >> kind.bits - 1) << kind.bits if kind.signed else 0)
         return not tests or met(tests, numbers)
 
-    def lacking(self, given: Mapping[str, Raw]) -> list[str]:
-        """Names of the parts that a frame with these values does not have."""
+    def handing(self, part: Part) -> tuple[int, int] | None:
+        """The last number of a length of its own, and the one that hands over; None if it does not."""
+        if "otherwise" not in part.spec or part.role != "length":
+            return None
+        otherwise = int(part.spec["otherwise"])
+        span = part.spec.get("range")
+        return (whole_span(span)[1] if span else otherwise - 1), otherwise
+
+    def _length(self, part: Part, number: int) -> int:
+        """The number in one of the lengths; the longer one is not sent where it would not fit its bits."""
+        handing = self.handing(part)
+        if handing and number > handing[0]:
+            return handing[1]
+        return number & part.mask if part is self.longer else number
+
+    def lacking(self, given: Mapping[str, Raw], cut: Mapping[str, bytes]) -> list[str]:
+        """Names of the parts that a frame with these values and this header does not have."""
         numbers = {name: kind.default for part in self.parts for name, _, kind in part.values}
         numbers |= {name: raw for name, raw in given.items() if isinstance(raw, int)}
+        numbers |= {part.name: get(part.pieces, cut[part.name]) for part in self.parts if self.handing(part)}
         return [name for name, tests in self.tests.items() if not met(tests, numbers)]
 
     def id_bits(self) -> list[tuple[str, int, int, str]]:
@@ -537,6 +559,8 @@ class Frame:
         """The length, message number or address; None if the frame has none, or bytes are missing."""
         if role == "length":
             part = self.by_role.get(role)
+            if self.longer and cut.get(self.longer.name):
+                part = self.longer
             return self.step * get(part.pieces, cut[part.name]) if part and part.name in cut else None
         found = (
             self.id_bits()
@@ -709,7 +733,9 @@ class Splitter:
 
     def _judge(self, part: Part, cursor: Cursor, cut: Mapping[str, bytes]) -> None:
         frame = self._frame
-        if part.role == "length":
+        if part.role == "length" and frame.longer:
+            self._judge_two(part, cursor, cut)
+        elif part.role == "length":
             announced = (frame.number("length", cut) or 0) - frame.bias
             if not frame.least <= announced <= frame.most_sent:
                 raise Refused("length", cursor.at)
@@ -724,6 +750,23 @@ class Splitter:
                 raise Refused("unknown", cursor.at, told=False)
             if address is not None and not message.allows(address):
                 raise Refused("range", cursor.at, told=False)
+
+    def _judge_two(self, part: Part, cursor: Cursor, cut: Mapping[str, bytes]) -> None:
+        """Check one of two lengths."""
+        frame = self._frame
+        first = frame.by_role["length"]
+        handing = frame.handing(first)
+        assert handing
+        last, otherwise = handing
+        if not frame.has(part, cut):
+            return
+        number = get(part.pieces, cut[part.name])
+        if part is first:
+            wrong = number != otherwise and not frame.least + frame.bias <= number <= last
+        else:
+            wrong = not last < number <= frame.most + frame.bias
+        if wrong:
+            raise Refused("length", cursor.at)
 
     def _payload(self, part: Part, cursor: Cursor, cut: Mapping[str, bytes]) -> bytes:
         frame = self._frame
