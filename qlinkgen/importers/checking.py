@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from qlinkgen.errors import Fault
-from qlinkgen.importers.document import Document, Item
+from qlinkgen.importers.document import Constants, Document, Item, Message, Record
 from qlinkgen.importers.notes import Notes
 from qlinkgen.importers.yaml_text import Written, write
 from qlinkgen.schema import loads
@@ -56,10 +56,10 @@ def _refused(document: Document, result: Written, faults: list[Fault], notes: No
         if item not in gone:
             gone.add(item)
             section, name = item
-            line_of_input = _found(document, section, name).line
-            notes.add(
-                line_of_input, f"{_SINGULAR[section]} {name} is left out: {fault.message} [{fault.rule}]"
-            )
+            found = _found(document, section, name)
+            source = found.source if isinstance(found, Constants | Record | Message) else None
+            what = f"{_SINGULAR[section]} {name} is left out: {fault.message} [{fault.rule}]"
+            (source or notes).add(found.line, what)
     return gone
 
 

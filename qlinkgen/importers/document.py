@@ -10,6 +10,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
+from qlinkgen.importers.notes import Notes
+
 Value: TypeAlias = "bool | int | str | Notation | list[Value] | dict[str, Value] | Commented"
 
 
@@ -79,7 +81,11 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Constants:
-    """An enum, or flags."""
+    """An enum, or flags.
+
+    Attributes:
+        source: Notes on the file that it is from, where that is not the first one.
+    """
 
     name: str
     type: str
@@ -87,6 +93,7 @@ class Constants:
     line: int = 0
     doc: str = ""
     key: str = "value"
+    source: Notes | None = None
 
     @property
     def data(self) -> Value:
@@ -101,12 +108,17 @@ class Constants:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A named type of fields in a row."""
+    """A named type of fields in a row.
+
+    Attributes:
+        source: Notes on the file that it is from, where that is not the first one.
+    """
 
     name: str
     fields: tuple[Field, ...]
     line: int = 0
     doc: str = ""
+    source: Notes | None = None
 
     @property
     def data(self) -> Value:
@@ -120,6 +132,7 @@ class Message:
 
     Attributes:
         keys: Keys before the fields; the id is one of them.
+        source: Notes on the file that it is from, where that is not the first one.
     """
 
     name: str
@@ -127,6 +140,7 @@ class Message:
     line: int = 0
     keys: Mapping[str, Value] = field(default_factory=dict)
     doc: str = ""
+    source: Notes | None = None
 
     @property
     def data(self) -> Value:

@@ -47,6 +47,10 @@ class Names:
         self._taken = set(taken)
         self._numbers: dict[str, int] = {}
 
+    def has_free(self, raw: str) -> bool:
+        """Whether a name of the input can have the name that it asks for."""
+        return schema_name(raw, self._what.split()[-1]) not in self._taken
+
     def take(self, raw: str, line: int, notes: Notes | None = None) -> str:
         """The name for a name of the input, with a number if another one has it.
 
@@ -67,6 +71,12 @@ class Names:
         self._numbers[wanted] = number
         self._taken.add(name)
         return name
+
+
+def last_name(raw: str, names: Names) -> str:
+    """What to take for ``outer::inner``: the inner name, or all of it if another one has that."""
+    last = raw.rpartition("::")[2]
+    return last if names.has_free(last) else raw
 
 
 def without_prefix(raw: Sequence[str]) -> list[str]:

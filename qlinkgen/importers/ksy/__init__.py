@@ -7,16 +7,19 @@ from pathlib import Path
 
 from qlinkgen.importers.document import Block, Document, Message, Notation, Record, Value, between
 from qlinkgen.importers.frames import assumed
-from qlinkgen.importers.ksy.bounds import bounded, size_of
+from qlinkgen.importers.ksy.bounds import bounded, limited, size_of, varies
 from qlinkgen.importers.ksy.enums import Enums
 from qlinkgen.importers.ksy.fields import Layout, Shared, is_open
+from qlinkgen.importers.ksy.flat import record_of
 from qlinkgen.importers.ksy.frame import LARGEST, Framed, framed, stream_of
 from qlinkgen.importers.ksy.tree import Refused, Type, read_tree
 from qlinkgen.importers.names import Names, schema_name
 from qlinkgen.importers.notes import Notes
-from qlinkgen.importers.reading import content, text_of
 
 __all__ = ["read_ksy"]
+
+#: Bytes or items of the largest field of variable size in a record.
+_LARGEST_FIELD = 255
 
 
 def read_ksy(path: Path | str, notes: Notes, *, name: str = "") -> Document:
@@ -31,7 +34,7 @@ def read_ksy(path: Path | str, notes: Notes, *, name: str = "") -> Document:
         ImportFileError: the file cannot be read, or is not a Kaitai Struct file.
     """
     file = Path(os.fspath(path))
-    root = read_tree(text_of(content(path), notes), notes)
+    root = read_tree(file, notes)
     inside = stream_of(root, notes)
     order = "little" if inside.endian == "le" else "big"
     names = Names(notes, "type", types=True)
@@ -41,8 +44,8 @@ def read_ksy(path: Path | str, notes: Notes, *, name: str = "") -> Document:
     called = (meta.text("id") if meta else "") or file.stem
     messages = _messages(frame, inside, called, shared)
     records = _records(shared)
-    parts = _parts(frame, messages)
-    messages = _bounded(messages, records, shared)
+    parts = _parts(frame, inside, messages)
+    messages, records = _bounded(messages, records, shared)
     protocol: dict[str, Value] = {"name": name or schema_name(called, "protocol")}
     if meta and meta.text("title"):
         protocol["title"] = meta.text("title")
@@ -60,11 +63,11 @@ def read_ksy(path: Path | str, notes: Notes, *, name: str = "") -> Document:
     )
 
 
-def _parts(frame: Framed | None, messages: tuple[Message, ...]) -> Value:
+def _parts(frame: Framed | None, inside: Type, messages: tuple[Message, ...]) -> Value:
     """The frame that was found; without one the payload alone, if its size follows from its fields."""
     if frame is not None:
         return Block({"parts": Block(frame.parts)})
-    if any(is_open(each.fields) for each in messages):
+    if any(is_open(each.fields) for each in messages) or not inside.attributes:
         return _assumed(messages)
     return Block({"parts": Block({"data": {"role": "payload", "size": between(0, LARGEST)}})})
 
@@ -73,47 +76,71 @@ def _frame(inside: Type, notes: Notes) -> Framed | None:
     try:
         return framed(inside, notes)
     except Refused as error:
-        notes.add(error.line, f"the sequence is not divided into a frame: {error.text}")
+        error.note("the sequence is not divided into a frame")
         return None
 
 
 def _messages(frame: Framed | None, inside: Type, called: str, shared: Shared) -> tuple[Message, ...]:
     names = Names(shared.notes, "message")
-    if not inside.attributes:
-        raise shared.notes.error(inside.line, "the file describes no bytes: it has no seq")
     listed: list[tuple[dict[str, Value], str, Type]]
-    if frame is None:
+    if frame is not None:
+        listed = [({"id": number}, name, type_) for number, name, type_ in frame.messages]
+    elif inside.attributes:
         listed = [({}, inside.name.rpartition("::")[2] or called, inside)]
     else:
-        listed = [({"id": number}, name, type_) for number, name, type_ in frame.messages]
+        listed = [
+            ({"id": at, "confirmed": False}, each.name.rpartition("::")[2], each)
+            for at, each in enumerate(_unused(inside), 1)
+        ]
+        if not listed:
+            raise shared.notes.error(inside.line, "the file describes no bytes: it has no seq")
     found: list[Message] = []
     for keys, name, type_ in listed:
         try:
-            fields = Layout(type_, shared).fields(type_.attributes)
+            fields = Layout(type_, shared, record=False).fields()
         except Refused as error:
-            shared.notes.add(error.line, f"message {name[:60]} is left out: {error.text}")
+            error.note(f"message {name[:60]} is left out")
             continue
         doc = type_.doc if type_.outer else ""
         numbered: dict[str, Value] = (
-            {"id": 1, "confirmed": False} if frame is None and is_open(fields) else {}
+            {"id": 1, "confirmed": False} if frame is None and not keys and is_open(fields) else {}
         )
-        found.append(Message(names.take(name, type_.line), fields, type_.line, {**keys, **numbered}, doc))
+        taken = names.take(name, type_.line, type_.notes)
+        found.append(Message(taken, fields, type_.line, {**keys, **numbered}, doc, type_.notes))
     return tuple(found)
+
+
+def _unused(root: Type) -> list[Type]:
+    """The types that no other one has: the messages of a file without a sequence."""
+    used: list[Type | None] = []
+    for type_ in root.all():
+        for each in type_.attributes:
+            used.append(record_of(each))
+            if each.switch is not None:
+                used += [type_.find_type(case.word) for _, case in each.switch.mapping("cases")]
+    return [each for each in root.types.values() if not any(each is other for other in used)]
 
 
 def _assumed(messages: tuple[Message, ...]) -> Value:
     ids = [each.keys.get("id") for each in messages]
-    greatest = max((int(each.text, 0) for each in ids if isinstance(each, Notation)), default=1)
+    numbers = [int(each.text, 0) if isinstance(each, Notation) else each for each in ids]
+    greatest = max((each for each in numbers if isinstance(each, int)), default=1)
     return assumed("A Kaitai Struct file", LARGEST, greatest)
 
 
 def _bounded(
     messages: tuple[Message, ...], records: tuple[Record, ...], shared: Shared
-) -> tuple[Message, ...]:
+) -> tuple[tuple[Message, ...], tuple[Record, ...]]:
+    """The messages and records with bounds, where fields need them."""
     sizes = {each.name: int(each.type[1:]) // 8 for each in shared.enums.all}
+    limits: list[Record] = []
+    varying: set[str] = set()
     for record in records:  # each after those that it contains
+        limits.append(limited(record, sizes, _LARGEST_FIELD))
         sizes[record.name] = size_of(record.fields, sizes)
-    return tuple(bounded(each, sizes, LARGEST) for each in messages)
+        if varies(limits[-1].fields, varying):
+            varying.add(record.name)
+    return tuple(bounded(each, sizes, varying, LARGEST) for each in messages), tuple(limits)
 
 
 def _records(shared: Shared) -> tuple[Record, ...]:
@@ -124,9 +151,9 @@ def _records(shared: Shared) -> tuple[Record, ...]:
             type_, called = shared.wanted[each]
             made[each] = None
             try:
-                fields = Layout(type_, shared).fields(type_.attributes)
+                fields = Layout(type_, shared).fields()
             except Refused as error:
-                shared.notes.add(error.line, f"type {type_.name[:60]} is left out: {error.text}")
+                error.note(f"type {type_.name[:60]} is left out")
                 continue
-            made[each] = Record(called, fields, type_.line, type_.doc)
+            made[each] = Record(called, fields, type_.line, type_.doc, type_.notes)
     return tuple(each for each in reversed(made.values()) if each is not None)

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from qlinkgen.importers import cells
 from qlinkgen.importers.document import Constant, Constants
-from qlinkgen.importers.ksy.tree import Node, Type
-from qlinkgen.importers.names import Names
+from qlinkgen.importers.ksy.tree import Attribute, Node, Type
+from qlinkgen.importers.names import Names, last_name
 from qlinkgen.importers.notes import Notes
 
 
@@ -28,23 +28,26 @@ class Enums:
         """All of them."""
         return tuple(self._made.values())
 
-    def of(self, name: str, type_: str, scope: Type, line: int) -> str:
-        """The type of a field with an enum; its integer type if the enum is not known."""
-        found = scope.find_enum(name)
+    def of(self, attribute: Attribute, type_: str) -> str:
+        """The type of a field that may have an enum; its integer type without one."""
+        name, line, notes = attribute.text("enum"), attribute.line, attribute.notes
+        if not name:
+            return type_
+        found = attribute.scope.find_enum(name)
         if found is None:
-            self._notes.add(line, f"the enum {name[:60]} is not in this file; the field is a number")
+            notes.add(line, f"the enum {name[:60]} is not in this file; the field is a number")
             return type_
         full, node = found
         if (full, type_) not in self._made:
             values = tuple(self._constants(node, type_))
             if not values:
-                self._notes.add(
-                    line, f"the enum {name[:60]} has no values for {type_}; the field is a number"
-                )
+                notes.add(line, f"the enum {name[:60]} has no values for {type_}; the field is a number")
                 return type_
             again = any(each == full for each, _ in self._made)
-            called = self._names.take(f"{full}_{type_}" if again else full, node.line)
-            self._made[full, type_] = Constants(called, type_, values, node.line)
+            called = self._names.take(
+                f"{full}_{type_}" if again else last_name(full, self._names), node.line, node.notes
+            )
+            self._made[full, type_] = Constants(called, type_, values, node.line, source=node.notes)
         return self._made[full, type_].name
 
     def _constants(self, node: Node, type_: str) -> Iterator[Constant]:
@@ -55,14 +58,14 @@ class Enums:
             number = cells.integer(key)
             low, high = (0, 1 << width) if type_[0] == "u" else (-(1 << (width - 1)), 1 << (width - 1))
             if number is None or not low <= number < high or number in seen:
-                self._notes.add(
+                node.notes.add(
                     value.line, f"value {key[:40]} of an enum is left out: it does not fit {type_}"
                 )
                 continue
             seen.add(number)
             raw = value.text("id") if isinstance(value.value, dict) else value.word
             doc = value.text("doc") if isinstance(value.value, dict) else ""
-            yield Constant(names.take(raw, value.line), number, doc)
+            yield Constant(names.take(raw, value.line, value.notes), number, doc)
 
 
 def number_of(scope: Type, text: str) -> int | None:

@@ -1,21 +1,168 @@
-"""The expressions that a schema can state: references to earlier fields, and conditions on them."""
+"""Parses the expressions of Kaitai Struct as far as a schema can state them: numbers, fields, operators."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Final, TypeAlias
 
-from qlinkgen.importers import cells
-from qlinkgen.importers.document import Notation, Value
-from qlinkgen.importers.names import schema_name
-
-_NAME = r"[a-z][a-z0-9_]*(?:\.[a-z][a-z0-9_]*)*"
-_COUNT = re.compile(rf"\(?\s*(?P<name>{_NAME})\s*(?:(?P<sign>[-+*/])\s*(?P<number>\w+)\s*)?\)?(?:\.as<\w+>)?")
-_TERM = re.compile(
-    rf"\(?\s*(?P<not>not\s+)?(?P<name>_|{_NAME}|_\.{_NAME})\s*(?:(?P<sign>==|!=|>=|<=|>|<)\s*(?P<value>[\w:.]+))?\s*\)?"
+_CONVERSION = re.compile(r"\.(?:to_i\b|as<[\w:]+>)")
+_TOKEN = re.compile(
+    r"""\s*(?:(?P<number>0[xX][0-9a-fA-F_]+|0[bB][01_]+|[0-9][0-9_]*)(?![\w.])
+    |(?P<name>[a-z_][a-z0-9_]*(?:(?:::|\.)[a-z_][a-z0-9_]*)*)
+    |(?P<sign>==|!=|<=|>=|<<|>>|[<>()+*/%&|^-]))""",
+    re.VERBOSE,
 )
-_LONGEST = 500
+_LONGEST: Final = 500
+_DEEPEST: Final = 50
+_COMPARISONS: Final = ("==", "!=", "<=", ">=", "<", ">")
+#: Operators of two operands from the loosest to the tightest, as in Python.
+_LEVELS: Final = (
+    ("or",), ("and",), _COMPARISONS, ("|",), ("^",), ("&",), ("<<", ">>"), ("+", "-"), ("*", "/", "%"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A whole number; `name` is that of a value of an enum."""
+
+    value: int
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A field, an instance, or a value of an enum."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """An operator with its operands: two, or one of `not` and of `-`."""
+
+    sign: str
+    operands: tuple[Expression, ...]
+
+
+Expression: TypeAlias = Number | Name | Operation
+
+
+class _Wrong(Exception):
+    """Something else than an expression of these kinds."""
+
+
+def parsed(text: str) -> Expression | None:
+    """An expression; None if it has texts, lists, calls, floats or choices."""
+    if len(text) > _LONGEST:
+        return None
+    try:
+        parser = _Parser(list(_tokens(_CONVERSION.sub("", text).strip())))
+        found = parser.at_level(0)
+        return found if parser.at_end else None
+    except _Wrong:
+        return None
+
+
+def _tokens(text: str) -> Iterator[str]:
+    at = 0
+    while at < len(text):
+        found = _TOKEN.match(text, at)
+        if found is None:
+            raise _Wrong
+        at = found.end()
+        yield found[0].strip()
+
+
+class _Parser:
+    def __init__(self, tokens: list[str]) -> None:
+        self._tokens = tokens
+        self._at = 0
+        self._depth = 0
+
+    @property
+    def at_end(self) -> bool:
+        return self._at == len(self._tokens)
+
+    def _next(self) -> str:
+        return "" if self.at_end else self._tokens[self._at]
+
+    def at_level(self, level: int) -> Expression:
+        """Operations of a level and of tighter ones."""
+        if level == len(_LEVELS):
+            return self._operand()
+        if _LEVELS[level] is _COMPARISONS and self._next() == "not":
+            self._at += 1
+            return Operation("not", (self.at_level(level),))
+        found = self.at_level(level + 1)
+        while (sign := self._next()) in _LEVELS[level]:
+            self._at += 1
+            found = Operation(sign, (found, self.at_level(level + 1)))
+        return found
+
+    def _operand(self) -> Expression:
+        token = self._next()
+        self._at += 1
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise _Wrong
+        if token == "(":
+            found = self.at_level(0)
+            if self._next() != ")":
+                raise _Wrong
+            self._at += 1
+        elif token == "-":
+            found = Operation("-", (self._operand(),))
+        elif token[:1].isdigit():
+            found = Number(int(token.replace("_", ""), 0 if token[:2].lower() in ("0x", "0b") else 10))
+        elif token[:1].isalpha() or token[:1] == "_":
+            found = Name(token)
+        else:
+            raise _Wrong
+        self._depth -= 1
+        return found
+
+
+def names(expression: Expression) -> Iterator[str]:
+    """The names in an expression."""
+    if isinstance(expression, Name):
+        yield expression.text
+    elif isinstance(expression, Operation):
+        for each in expression.operands:
+            yield from names(each)
+
+
+def replaced(expression: Expression, of: Callable[[str], Expression | None]) -> Expression | None:
+    """The expression with something in place of each name; None if one has nothing."""
+    if isinstance(expression, Name):
+        return of(expression.text)
+    if isinstance(expression, Operation):
+        operands = [replaced(each, of) for each in expression.operands]
+        if any(each is None for each in operands):
+            return None
+        return folded(Operation(expression.sign, tuple(each for each in operands if each is not None)))
+    return expression
+
+
+def folded(operation: Operation) -> Expression:
+    """The number that an operation of numbers is, if it is one."""
+    values = [each.value for each in operation.operands if isinstance(each, Number)]
+    if len(values) != len(operation.operands):
+        return operation
+    match (operation.sign, values):
+        case ("+", [a, b]):
+            return Number(a + b)
+        case ("-", [a, b]):
+            return Number(a - b)
+        case ("-", [a]):
+            return Number(-a)
+        case ("*", [a, b]):
+            return Number(a * b)
+        case ("<<", [a, b]) if 0 <= b < 64:
+            return Number(a << b)
+        case _:
+            return operation
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,96 +174,72 @@ class Count:
     offset: int = 0
 
 
-def count(text: str) -> Count | int | None:
-    """A number, ``NAME``, ``NAME + N``, ``NAME - N`` or ``NAME * N``; None for other expressions."""
-    text = text.strip()
-    if (whole := _whole(text)) is not None:
-        return whole
-    found = _COUNT.fullmatch(text[:_LONGEST])
-    if found is None:
+def count(expression: Expression | None) -> Count | int | None:
+    """A number, or a field with a factor and a term; None for other expressions."""
+    if isinstance(expression, Number):
+        return expression.value
+    if isinstance(expression, Name):
+        return Count(expression.text)
+    if expression is None or len(expression.operands) != 2:
         return None
-    if not found["sign"]:
-        return Count(found["name"])
-    number = _whole(found["number"])
-    match (found["sign"], number):
-        case ("+", int()):
-            return Count(found["name"], offset=number or 0)
-        case ("-", int()):
-            return Count(found["name"], offset=-(number or 0))
-        case ("*", int()) if number:
-            return Count(found["name"], scale=number)
+    left, right = (count(each) for each in expression.operands)
+    match expression.sign:
+        case "+" if isinstance(left, Count) and isinstance(right, int):
+            return Count(left.name, left.scale, left.offset + right)
+        case "+" if isinstance(left, int) and isinstance(right, Count):
+            return Count(right.name, right.scale, right.offset + left)
+        case "-" if isinstance(left, Count) and isinstance(right, int):
+            return Count(left.name, left.scale, left.offset - right)
+        case "*" if isinstance(left, Count) and isinstance(right, int) and right > 0:
+            return Count(left.name, left.scale * right, left.offset * right)
+        case "*" if isinstance(left, int) and isinstance(right, Count) and left > 0:
+            return Count(right.name, right.scale * left, right.offset * left)
         case _:
             return None
 
 
-def _whole(text: str) -> int | None:
-    found = cells.integer(text)
-    return found if found is not None and re.fullmatch(r"0[xX][0-9a-fA-F_]+|0b[01_]+|[0-9_]+", text) else None
+@dataclass(frozen=True, slots=True)
+class Slice:
+    """Bits of a field, moved to the right.
 
-
-#: Gives the number of a value such as ``kind::data`` for a field; None if it is not known.
-Constant = Callable[[str, str], int | None]
-#: Gives least and greatest value of a field; None if it is not a whole number.
-Limits = Callable[[str], tuple[int, int] | None]
-
-
-def condition(text: str, constant: Constant, limits: Limits) -> Value | None:
-    """A condition in the notation of schemas; None for other expressions.
-
-    Args:
-        text: Comparisons of a field with a constant, joined by `and`.
-        constant: Looks up the names of enums.
-        limits: Looks up the range of a field.
+    Attributes:
+        mask: The bits, None for all of them.
     """
-    terms = re.split(r"\s+and\s+", text.strip()[:_LONGEST])
-    found: dict[str, Value] = {}
-    for each in terms:
-        match = _TERM.fullmatch(each.strip())
-        if match is None or each.count("(") != each.count(")"):
-            return None
-        name = match["name"].removeprefix("_.")
-        if name in found:
-            return None
-        if not match["sign"]:
-            if len(terms) == 1 and not match["not"]:
-                return name
-            found[name] = not match["not"]
-            continue
-        value = None if match["not"] else _compared(match, name, constant, limits)
-        if value is None:
-            return None
-        found[name] = value
-    return found
+
+    name: str
+    mask: int | None = None
+    shift: int = 0
 
 
-def _compared(match: re.Match[str], name: str, constant: Constant, limits: Limits) -> Value | None:
-    if match["value"] in ("true", "false"):
-        return (
-            (match["value"] == "true") is (match["sign"] == "==") if match["sign"] in ("==", "!=") else None
-        )
-    number = _whole(match["value"])
-    named = "" if number is not None else schema_name(match["value"].rpartition("::")[2])
-    number = constant(name, match["value"]) if number is None else number
-    if number is None:
+def sliced(expression: Expression) -> Slice | None:
+    """A field, or bits of it; None for other expressions."""
+    if isinstance(expression, Name):
+        return Slice(expression.text)
+    if not isinstance(expression, Operation) or len(expression.operands) != 2:
         return None
-    ends = limits(name)
-    match match["sign"]:
-        case "==":
-            return named or number
-        case "!=":
-            return Notation(f"not {named or number}")
-        case sign if ends is None:
-            del sign
-            return None
-        case ">":
-            return _range(number + 1, ends[1])
-        case ">=":
-            return _range(number, ends[1])
-        case "<":
-            return _range(ends[0], number - 1)
+    left, right = expression.operands
+    if isinstance(left, Number) and expression.sign == "&":
+        left, right = right, left
+    inner = sliced(left)
+    if inner is None or not isinstance(right, Number) or right.value < 0:
+        return None
+    match expression.sign:
+        case "&":
+            mask = right.value << inner.shift
+            return Slice(inner.name, mask if inner.mask is None else mask & inner.mask, inner.shift)
+        case ">>" if right.value < 64:
+            return Slice(inner.name, inner.mask, inner.shift + right.value)
         case _:
-            return _range(ends[0], number)
+            return None
 
 
-def _range(first: int, last: int) -> Value | None:
-    return Notation(f"{first}..{last}") if first < last else first if first == last else None
+def runs(mask: int) -> list[tuple[int, int]]:
+    """The first and the last bit of each run of bits of a mask."""
+    found: list[tuple[int, int]] = []
+    for at in range(mask.bit_length()):
+        if mask >> at & 1:
+            if found and found[-1][1] == at - 1:
+                found[-1] = found[-1][0], at
+            else:
+                found.append((at, at))
+    return found

@@ -5,19 +5,30 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
-from qlinkgen.importers import cells
 from qlinkgen.importers.document import Field, Notation, Value
 from qlinkgen.importers.ksy import expressions
 from qlinkgen.importers.ksy.blobs import MOST, blob, constant
-from qlinkgen.importers.ksy.enums import Enums, number_of
-from qlinkgen.importers.ksy.scalars import Scalar, bit_width, scalar
-from qlinkgen.importers.ksy.tree import Attribute, Node, Refused, Type
+from qlinkgen.importers.ksy.choices import Choices
+from qlinkgen.importers.ksy.conditions import Tested, condition
+from qlinkgen.importers.ksy.counts import Counts
+from qlinkgen.importers.ksy.enums import Enums
+from qlinkgen.importers.ksy.flat import flat, label, record_of
+from qlinkgen.importers.ksy.lookup import Lookup
+from qlinkgen.importers.ksy.opened import opened
+from qlinkgen.importers.ksy.scalars import Scalar, bit_order, bit_width, scalar
+from qlinkgen.importers.ksy.sizes import bits_of_type
+from qlinkgen.importers.ksy.tree import Attribute, Refused, Type
 from qlinkgen.importers.ksy.valid import valid
-from qlinkgen.importers.names import Names
+from qlinkgen.importers.names import Names, last_name
 from qlinkgen.importers.notes import Notes
 
-_SPARE = re.compile(r"(?:reserved|rsvd|unused|spare|padding|pad|unnamed)_?\d*")
+_SPARE: Final = re.compile(r"(?:reserved|rsvd|unused|spare|padding|pad|unnamed)_?\d*")
+#: Whether bytes are left.
+_MORE: Final = re.compile(
+    r"(?:not\s+_io\.eof|_io\.eof\s*==\s*false|_io\.eof\s*!=\s*true|_io\.pos\s*<\s*_io\.size)"
+)
 
 
 @dataclass
@@ -39,7 +50,8 @@ class Shared:
     def record(self, type_: Type) -> str:
         """The name of the record of a type."""
         if type_.name not in self.wanted:
-            self.wanted[type_.name] = type_, self.names.take(type_.name, type_.line)
+            raw = last_name(type_.name, self.names)
+            self.wanted[type_.name] = type_, self.names.take(raw, type_.line, type_.notes)
         return self.wanted[type_.name][1]
 
 
@@ -55,37 +67,44 @@ class _Bits:
 
 
 class Layout:
-    """Lays out one sequence.
+    """Lays out the sequence of a type.
 
     Args:
-        type_: The type that it is of, in which names are looked up.
+        type_: The type.
         shared: What the types have in common.
-        outside: Attributes before the sequence that it may refer to.
+        record: Whether it is that of a record, which has no choices and one level of records.
     """
 
-    def __init__(self, type_: Type, shared: Shared) -> None:
-        self._type = type_
+    def __init__(self, type_: Type, shared: Shared, *, record: bool = True) -> None:
         self._shared = shared
-        self._names = Names(shared.notes, "field")
-        self._called: dict[str, str] = {}
-        self._known: dict[str, Attribute] = {}
-        self._counts: dict[str, tuple[str, expressions.Count]] = {}
+        self._names = Names(type_.notes, "field")
+        found = opened(flat(type_, levels=1 if record else 2), every=record)
+        label(found.attributes)
+        self._attributes = found.attributes
+        self._groups = found.groups
+        self._called = {
+            each.path: self._names.take(each.label or each.id, each.line) for each in found.attributes
+        }
+        self._lookup = Lookup({each.path: each for each in found.attributes}, found.records)
+        self._runs = {
+            (path, first, last): self._names.take(_bits_name(self._called[path], first, last), type_.line)
+            for path, runs in self._lookup.bits.items()
+            for first, last in runs
+        }
+        self._choices = Choices(self._lookup, self._tested, shared.record)
         self._fields: list[Field] = []
         self._bits = _Bits()
         self._integers = 0
 
-    def fields(self, attributes: Sequence[Attribute]) -> tuple[Field, ...]:
-        """The fields of a sequence. Raises Refused."""
-        for each in attributes:
-            self._called[each.id] = self._names.take(each.id, each.line)
-        for each in attributes:
+    def fields(self) -> tuple[Field, ...]:
+        """The fields of the sequence. Raises Refused."""
+        for each in self._attributes:
             if each.trouble:
-                raise Refused(each.line, f"{each.id[:60]}: {each.trouble}")
-            self._collect_counts(each)
-            self._known[each.id] = each
-        for each in attributes:
+                raise Refused(each, f"{each.id[:60]}: {each.trouble}")
+        self._counts = Counts(self._lookup, self._groups, self._called)
+        for each in self._attributes:
             width = bit_width(each.type)
-            if width is not None and not each.text("if") and not each.text("repeat"):
+            if width is not None and not each.text("repeat"):
                 self._bit(each, width)
                 continue
             self._end_bits()
@@ -93,32 +112,12 @@ class Layout:
         self._end_bits()
         return tuple(self._fields)
 
-    def _collect_counts(self, attribute: Attribute) -> None:
-        """Note which field counts another one; it is filled by the codec."""
-        for key in ("size", "repeat-expr"):
-            text = attribute.text(key)
-            found = expressions.count(text) if text else None
-            if not isinstance(found, expressions.Count):
-                continue
-            counter = self._known.get(found.name)
-            if counter is None or self._scalar(counter) is None or found.name in self._counts:
-                raise Refused(
-                    attribute.line, f"{attribute.id[:60]}: {text[:60]} is not an earlier integer of its own"
-                )
-            self._counts[found.name] = attribute.id, found
-
-    def _scalar(self, attribute: Attribute) -> Scalar | None:
-        found = scalar(attribute.type, self._type.endian)
-        return found if found and found.limits and not attribute.text("repeat") else None
-
     # Fields ---------------------------------------------------------------------------------------------
 
     def _field(self, attribute: Attribute, width: int | None) -> Field:
-        keys: dict[str, Value] = {}
-        if attribute.id in self._counts:
-            keys |= self._counting(attribute.id)
+        keys: dict[str, Value] = self._counts.keys(attribute)
         if attribute.switch is not None:
-            type_, more = "", self._choice(attribute.switch)
+            type_, more = "", self._choices.keys(attribute)
         elif attribute.node.get("contents") is not None:
             type_, more = constant(attribute, little=self._shared.order == "little")
         else:
@@ -126,134 +125,135 @@ class Layout:
         keys |= more
         if attribute.text("repeat"):
             type_ = self._repeated(attribute, type_, keys)
-        if attribute.text("if"):
-            keys["if"] = self._condition(attribute, attribute.text("if"))
+        if attribute.switch is not None and attribute.text("if"):
+            raise Refused(
+                attribute, f"{attribute.id[:60]}: a choice that may be absent, in a number of bytes"
+            )
+        keys |= self._present(attribute, is_open=type_ in ("bytes", "text") or type_.endswith("[]"))
         if not keys and _SPARE.fullmatch(attribute.id) and re.fullmatch(r"u\d+", type_):
             keys = {"reserved": True}
-        return Field(self._called[attribute.id], type_, attribute.line, keys, attribute.doc)
-
-    def _counting(self, name: str) -> dict[str, Value]:
-        counted, found = self._counts[name]
-        keys: dict[str, Value] = {"counts": self._called[counted]}
-        if self._known[counted].text("size") and self._known[counted].type not in ("", "str", "strz"):
-            keys["counts_in"] = "bytes"
-        if found.scale != 1:
-            keys["scale"] = found.scale
-        if found.offset:
-            keys["offset"] = found.offset
-        return keys
+        return Field(self._called[attribute.path], type_, attribute.line, keys, attribute.doc)
 
     def _typed(self, attribute: Attribute, width: int | None) -> tuple[str, dict[str, Value]]:
         text = attribute.type
         if text in ("", "str", "strz"):
-            return blob(attribute, self._type.encoding, self._shared.notes)
+            return blob(attribute)
         if width is not None:
-            raise Refused(attribute.line, f"{attribute.id[:60]}: bits that are repeated or may be absent")
-        if (found := scalar(text, self._type.endian)) is not None:
+            raise Refused(attribute, f"{attribute.id[:60]}: bits that are repeated")
+        if (found := scalar(text, attribute.scope.endian)) is not None:
             return self._number(attribute, found)
         if scalar(text, "le") is not None:
-            raise Refused(attribute.line, f"{attribute.id[:60]}: the byte order of {text} is not stated")
-        inner = self._type.find_type(text)
+            raise Refused(attribute, f"{attribute.id[:60]}: the byte order of {text} is not stated")
+        inner = record_of(attribute)
         if inner is None:
-            raise Refused(attribute.line, f"{attribute.id[:60]}: the type {text[:60]} is not in this file")
-        if attribute.text("size") and not isinstance(
-            expressions.count(attribute.text("size")), expressions.Count
-        ):
-            raise Refused(
-                attribute.line, f"{attribute.id[:60]}: a type in a fixed or computed number of bytes"
-            )
+            raise Refused(attribute, f"{attribute.id[:60]}: the type {text[:60]} is not in this file")
+        text = attribute.text("size")
+        size = expressions.parsed(text)
+        if text and (not isinstance(size, expressions.Number) or bits_of_type(inner) != 8 * size.value):
+            raise Refused(attribute, f"{attribute.id[:60]}: its fields do not have {text[:60]} bytes")
         return self._shared.record(inner), {}
 
     def _number(self, attribute: Attribute, found: Scalar) -> tuple[str, dict[str, Value]]:
         keys: dict[str, Value] = {}
         if found.order and found.order != self._shared.order:
             keys["byteorder"] = found.order
-        keys |= valid(attribute, found.limits, self._shared.notes)
-        type_ = found.type
-        if attribute.text("enum"):
-            type_ = self._shared.enums.of(attribute.text("enum"), type_, self._type, attribute.line)
-        return type_, keys
+        keys |= valid(attribute, found.limits)
+        runs = self._lookup.bits.get(attribute.path)
+        if runs and not self._counts.has(attribute):
+            at: dict[str, Value] = {
+                self._runs[attribute.path, first, last]: first
+                if first == last
+                else Notation(f"{first}..{last}")
+                for first, last in runs
+            }
+            return found.type, {**keys, "bits": at}
+        return self._shared.enums.of(attribute, found.type), keys
 
     # Keys -----------------------------------------------------------------------------------------------
 
     def _repeated(self, attribute: Attribute, type_: str, keys: dict[str, Value]) -> str:
         if not type_ or type_ in ("bytes", "text") or "[" in type_ or "const" in keys:
-            raise Refused(attribute.line, f"{attribute.id[:60]}: only numbers and types are repeated")
+            raise Refused(attribute, f"{attribute.id[:60]}: only numbers and types are repeated")
         match attribute.text("repeat"):
             case "eos":
                 return f"{type_}[]"
             case "expr":
-                found = expressions.count(attribute.text("repeat-expr"))
-                if isinstance(found, int) and 0 < found <= MOST:
-                    return f"{type_}[{found}]"
-                if isinstance(found, expressions.Count):
-                    return f"{type_}[]"
-                text = attribute.text("repeat-expr")
-                raise Refused(attribute.line, f"{attribute.id[:60]}: '{text[:60]}' is not a field or number")
+                found = self._lookup.expression(attribute.text("repeat-expr"), attribute)
+                if isinstance(found, expressions.Number) and 0 < found.value <= MOST:
+                    return f"{type_}[{found.value}]"
+                return f"{type_}[]"
             case "until":
-                keys["until"] = self._condition(
-                    attribute, attribute.text("repeat-until"), self._type.find_type(attribute.type)
-                )
+                keys["last"] = self._last(attribute)
                 return f"{type_}[]"
             case other:
-                raise Refused(attribute.line, f"{attribute.id[:60]}: repeat: {other[:20]} is not known")
+                raise Refused(attribute, f"{attribute.id[:60]}: repeat: {other[:20]} is not known")
 
-    def _condition(self, attribute: Attribute, text: str, inside: Type | None = None) -> Value:
-        known = {each.id: each for each in inside.attributes} if inside else self._known
-
-        def limits(name: str) -> tuple[int, int] | None:
-            found = known.get(name)
-            number = scalar(found.type, (inside or self._type).endian) if found else None
-            width = bit_width(found.type) if found else None
-            return number.limits if number else (0, (1 << width) - 1) if width else None
-
-        found = expressions.condition(text, lambda _, value: number_of(self._type, value), limits)
-        if found is None or (
-            isinstance(found, str) and limits(found.rpartition(".")[2]) is None and "." not in found
-        ):
+    def _last(self, attribute: Attribute) -> Value:
+        """The condition on a record, which ends a row of them."""
+        inner = record_of(attribute)
+        text = attribute.text("repeat-until")
+        if inner is None or not inner.attributes:
             raise Refused(
-                attribute.line,
-                f"{attribute.id[:60]}: the condition '{text[:60]}' does not compare a field with a number",
+                attribute, f"{attribute.id[:60]}: only records are repeated until one of them is the last"
             )
-        names = [found] if isinstance(found, str) else list(found) if isinstance(found, dict) else []
-        for name in names:
-            first = name.partition(".")[0]
-            if first not in known:
-                raise Refused(attribute.line, f"{attribute.id[:60]}: '{name[:60]}' is not a field before it")
+        layout = Layout(inner, self._shared)
+        return layout.condition(re.sub(r"(?<![\w.])_\.", "", text), attribute)
+
+    def condition(self, text: str, attribute: Attribute) -> Value:
+        """A condition on all fields of the sequence. Raises Refused."""
+        after = Attribute("_", attribute.node, self._lookup.records[""])
+        self._lookup = Lookup({**self._lookup.known, "_": after}, self._lookup.records)
+        return self._stated(text, after, attribute)
+
+    def _stated(self, text: str, attribute: Attribute, where: Attribute) -> dict[str, Value]:
+        found = condition(self._lookup.expression(text, attribute), self._tested)
+        if found is None:
+            why = (
+                self._lookup.reason(text, attribute)
+                or f"the condition '{text[:60]}' does not compare a field with a number"
+            )
+            raise Refused(where, f"{where.id[:60]}: {why}")
         return found
 
-    def _choice(self, node: Node) -> dict[str, Value]:
-        on = node.text("switch-on")
-        if expressions.count(on) != expressions.Count(on) or on.partition(".")[0] not in self._known:
-            raise Refused(node.line, f"the choice by '{on[:60]}' is not one by a field before it")
-        cases: dict[str, Value] = {}
-        default: dict[str, Value] = {}
-        for key, value in (node.get("cases") or Node(None, (), node.source)).items:
-            type_ = self._case(value)
-            if key == "_":
-                default = {"default": type_}
-                continue
-            number = cells.integer(key) if cells.integer(key) is not None else number_of(self._type, key)
-            if number is None:
-                raise Refused(value.line, f"the case '{key[:60]}' is not a number or a value of an enum")
-            cases[str(number)] = type_
-        return {"switch": on, "cases": cases, **default}
+    def _present(self, attribute: Attribute, *, is_open: bool) -> dict[str, Value]:
+        """The keys that say where a field is present. Raises Refused."""
+        found: dict[str, Value] = {}
+        text = attribute.text("if")
+        for choice, numbers in attribute.given:
+            found |= self._choices.condition(choice, numbers)
+            if choice.text("if"):
+                found |= self._stated(choice.text("if"), choice, attribute)
+        if text and _MORE.fullmatch(text.strip().removeprefix("(").removesuffix(")")):
+            # A field that takes the rest may be empty.
+            return {"if": found} if found else {} if is_open else {"optional": True}
+        if text:
+            found |= self._stated(text, attribute, attribute)
+        (name, value), *others = found.items() if found else [("", None)]
+        if value is True and not others:
+            return {"if": name}
+        return {"if": found} if found else {}
 
-    def _case(self, node: Node) -> str:
-        text = node.word
-        if (found := scalar(text, self._type.endian)) is not None:
-            return found.type
-        inner = self._type.find_type(text)
-        if inner is None:
-            raise Refused(node.line, f"the type '{text[:60]}' of a case is not in this file")
-        return self._shared.record(inner)
+    def _tested(self, path: str) -> Tested | None:
+        limits = self._lookup.limits(path)
+        if limits is None:
+            return None
+        called = self._called[path]
+
+        def bit(first: int, last: int) -> str | None:
+            return self._runs.get((path, first, last))
+
+        return Tested(called, limits, bit_width(self._lookup.known[path].type) == 1, bit)
 
     # Bits -----------------------------------------------------------------------------------------------
 
     def _bit(self, attribute: Attribute, width: int) -> None:
+        if self._bits.attributes:
+            last, _ = self._bits.attributes[-1]
+            if _place(last) != _place(attribute):
+                self._end_bits()
         if self._bits.width + width > 64:
             raise Refused(
-                attribute.line, f"{attribute.id[:60]}: bits that end more than 64 bits after whole bytes"
+                attribute, f"{attribute.id[:60]}: bits that end more than 64 bits after whole bytes"
             )
         self._bits.attributes.append((attribute, width))
         if self._bits.width % 8 == 0:
@@ -264,50 +264,66 @@ class Layout:
         if not bits.attributes:
             return
         size = -(-bits.width // 8)
-        little = self._type.bit_endian == "le"
+        first, _ = bits.attributes[0]
+        little = bit_order(first.type, first.scope.bit_endian) == "le"
         keys: dict[str, Value] = {}
         if size > 1 and self._shared.order != ("little" if little else "big"):
             keys["byteorder"] = "little" if little else "big"
-        first, _ = bits.attributes[0]
+        present = self._present(first, is_open=False)
         if len(bits.attributes) == 1 and bits.width % 8 == 0:
-            type_ = f"u{bits.width}"
-            keys |= valid(first, (0, (1 << bits.width) - 1), self._shared.notes)
-            if first.text("enum"):
-                type_ = self._shared.enums.of(first.text("enum"), type_, self._type, first.line)
-            self._fields.append(Field(self._called[first.id], type_, first.line, keys, first.doc))
+            keys |= {**valid(first, (0, (1 << bits.width) - 1)), **self._counts.keys(first), **present}
+            type_ = self._shared.enums.of(first, f"u{bits.width}")
+            if not keys and _SPARE.fullmatch(first.id) and type_ == f"u{bits.width}":
+                keys = {"reserved": True}
+            self._fields.append(Field(self._called[first.path], type_, first.line, keys, first.doc))
             return
         at, inside = 0, dict[str, Value]()
         for attribute, width in bits.attributes:
             low = at if little else 8 * size - at - width
             at += width
             if not _SPARE.fullmatch(attribute.id):
-                inside[self._called[attribute.id]] = self._bit_keys(attribute, low, width)
+                inside[self._called[attribute.path]] = self._bit_keys(attribute, low, width)
         self._integers += 1
         name = self._names.take("bits" if self._integers == 1 else f"bits_{self._integers}", first.line)
         keys |= {"bits": inside} if inside else {"reserved": True}
-        self._fields.append(Field(name, f"u{8 * size}", first.line, keys))
+        self._fields.append(Field(name, f"u{8 * size}", first.line, keys | present))
 
     def _bit_keys(self, attribute: Attribute, low: int, width: int) -> Value:
         at: Value = low if width == 1 else Notation(f"{low}..{low + width - 1}")
         keys: dict[str, Value] = {"at": at}
-        if attribute.text("enum"):
-            type_ = self._shared.enums.of(attribute.text("enum"), f"u{width}", self._type, attribute.line)
-            if type_ != f"u{width}":
-                keys["type"] = type_
+        type_ = self._shared.enums.of(attribute, f"u{width}")
+        if type_ != f"u{width}":
+            keys["type"] = type_
         if width > 1:
-            stated = valid(attribute, (0, (1 << width) - 1), self._shared.notes)
+            stated = valid(attribute, (0, (1 << width) - 1))
             keys |= {key: each for key, each in stated.items() if key == "range"}
         if attribute.doc:
             keys["doc"] = attribute.doc
         return keys if len(keys) > 1 else at
 
 
+def _place(attribute: Attribute) -> object:
+    """What bits of one integer have in common."""
+    order = bit_order(attribute.type, attribute.scope.bit_endian)
+    return attribute.within, attribute.text("if"), attribute.given, order
+
+
+def _bits_name(of: str, first: int, last: int) -> str:
+    return f"{of}_{first}" if first == last else f"{of}_{first}_{last}"
+
+
 def is_open(fields: Sequence[Field]) -> bool:
     """Whether the size of fields follows from nothing that they state."""
-    counted = {each.keys["counts"] for each in fields if "counts" in each.keys}
+    counted: set[str] = set()
+    for each in fields:
+        counts = each.keys.get("counts")
+        counted.update(str(name) for name in (counts if isinstance(counts, list) else [counts]))
     return any(
-        (each.type in ("bytes", "text") or each.type.endswith("[]"))
-        and each.name not in counted
-        and not each.keys.keys() & {"until", "terminator"}
+        each.keys.keys() & {"optional", "terminator"}
+        or (each.name not in counted and "last" not in each.keys and _takes_rest(each))
         for each in fields
     )
+
+
+def _takes_rest(each: Field) -> bool:
+    return each.type in ("bytes", "text") or each.type.endswith("[]") or each.keys.get("default") == "bytes"

@@ -61,3 +61,8 @@ def bit_width(text: str) -> int | None:
     """The number of bits of a type such as ``b3``; None if it is not one."""
     found = _BITS.fullmatch(text)
     return int(found["width"]) if found and 0 < int(found["width"]) <= 64 else None
+
+
+def bit_order(text: str, endian: str) -> str:
+    """The order of the bits of a type such as ``b3le``: ``le`` or ``be``."""
+    return text[-2:] if text.endswith(("le", "be")) else endian

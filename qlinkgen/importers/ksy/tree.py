@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
+from pathlib import Path as FilePath
 from typing import Final
 
 from qlinkgen.importers.notes import Notes
+from qlinkgen.importers.reading import Unreadable, content, text_of
 from qlinkgen.schema.source import Data, Path, Source, parse
 
 #: Keys of an attribute that change its bytes in a way that schemas cannot state.
 _REFUSED: Final[Mapping[str, str]] = {
-    "process": "a process is code",
     "io": "another stream is not on the line",
     "pos": "a position is not on the line",
     "parent": "another parent is not known",
@@ -20,28 +23,39 @@ _REFUSED: Final[Mapping[str, str]] = {
 }
 _KNOWN: Final = frozenset(
     """id doc doc-ref contents type repeat repeat-expr repeat-until if size size-eos enum valid terminator
-    pad-right encoding include consume eos-error""".split()  # noqa: SIM905
+    pad-right encoding include consume eos-error process""".split()  # noqa: SIM905
 )
 _DEEPEST = 20
+_MOST_FILES = 100
+_ASKED = re.compile(r"\b([a-z][a-z0-9_]*)\.")
 
 
 class Refused(Exception):
     """A construct without which the rest of a type has no meaning."""
 
-    def __init__(self, line: int, text: str) -> None:
-        """Keep line and text for a note."""
+    def __init__(self, where: Node | Attribute, text: str) -> None:
+        """Keep place and text for a note."""
         super().__init__(text)
-        self.line = line
-        self.text = text
+        self._where = where
+        self._text = text
+
+    def note(self, about: str) -> None:
+        """Add a note on what is left out because of it."""
+        self._where.notes.add(self._where.line, f"{about}: {self._text}")
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A value of the file and its place."""
+    """A value of the file and its place.
+
+    Attributes:
+        notes: Those on its file.
+    """
 
     value: Data
     path: Path
     source: Source
+    notes: Notes
 
     @property
     def line(self) -> int:
@@ -51,7 +65,7 @@ class Node:
     def get(self, key: str) -> Node | None:
         """The value of a key, None if this is not a mapping with it."""
         if isinstance(self.value, dict) and key in self.value:
-            return Node(self.value[key], (*self.path, key), self.source)
+            return Node(self.value[key], (*self.path, key), self.source, self.notes)
         return None
 
     def text(self, key: str) -> str:
@@ -71,14 +85,24 @@ class Node:
         """The keys and values of a mapping."""
         if isinstance(self.value, dict):
             for key, value in self.value.items():
-                yield key, Node(value, (*self.path, key), self.source)
+                yield key, Node(value, (*self.path, key), self.source, self.notes)
+
+    def mapping(self, key: str) -> Iterator[tuple[str, Node]]:
+        """The keys and values of the mapping under a key."""
+        found = self.get(key)
+        return found.items if found else iter(())
+
+    def listing(self, key: str) -> Iterator[Node]:
+        """The items of the list under a key."""
+        found = self.get(key)
+        return found.listed if found else iter(())
 
     @property
     def listed(self) -> Iterator[Node]:
         """The items of a list."""
         if isinstance(self.value, list):
             for at, value in enumerate(self.value):
-                yield Node(value, (*self.path, at), self.source)
+                yield Node(value, (*self.path, at), self.source, self.notes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,17 +112,40 @@ class Attribute:
     Attributes:
         id: Its name.
         node: All of its keys.
+        scope: The type of whose sequence it is, in which names are looked up.
         trouble: Why it cannot be taken, empty if it can.
+        within: The fields in whose place it is: of records that are divided, from the outside inwards.
+        label: What it is called, the id by default.
+        given: The choices of which it is a part of a case, each with the numbers of the case.
     """
 
     id: str
     node: Node
+    scope: Type
     trouble: str = ""
+    within: tuple[str, ...] = ()
+    label: str = ""
+    given: tuple[tuple[Attribute, tuple[int, ...]], ...] = ()
 
     @property
     def line(self) -> int:
         """Line on which it begins."""
         return self.node.line
+
+    @property
+    def notes(self) -> Notes:
+        """Those on its file."""
+        return self.node.notes
+
+    @property
+    def path(self) -> str:
+        """What an expression of the outermost sequence calls it."""
+        return ".".join((*self.within, self.id))
+
+    @property
+    def single(self) -> bool:
+        """Whether it is always present, once."""
+        return not self.text("repeat") and not self.text("if")
 
     def text(self, key: str) -> str:
         """The value of a key as text."""
@@ -107,13 +154,14 @@ class Attribute:
     @property
     def type(self) -> str:
         """Name of the type, empty for bytes and for a choice."""
-        return self.text("type")
+        return "" if self.text("process") else self.text("type")
 
     @property
     def switch(self) -> Node | None:
         """The choice of a type."""
         found = self.node.get("type")
-        return found if found is not None and isinstance(found.value, dict) else None
+        choice = found is not None and isinstance(found.value, dict) and not self.text("process")
+        return found if choice else None
 
     @property
     def doc(self) -> str:
@@ -127,6 +175,9 @@ class Type:
 
     Attributes:
         name: Name as in the file; names of outer types precede it, with `::`.
+        instances: What is computed, by name.
+        imported: The outermost types of other files, by name.
+        asked: Names of records in the file whose fields are in expressions; of an outermost type.
     """
 
     name: str
@@ -138,6 +189,9 @@ class Type:
     attributes: list[Attribute] = field(default_factory=list)
     types: dict[str, Type] = field(default_factory=dict)
     enums: dict[str, Node] = field(default_factory=dict)
+    instances: dict[str, Node] = field(default_factory=dict)
+    imported: dict[str, Type] = field(default_factory=dict)
+    asked: frozenset[str] = frozenset()
 
     @property
     def line(self) -> int:
@@ -145,9 +199,30 @@ class Type:
         return self.node.line
 
     @property
+    def notes(self) -> Notes:
+        """Those on its file."""
+        return self.node.notes
+
+    @property
     def doc(self) -> str:
         """Its description."""
         return _doc(self.node)
+
+    @property
+    def referenced(self) -> frozenset[str]:
+        """Names of records in the file whose fields are in expressions."""
+        return self.outer.referenced if self.outer else self.asked
+
+    @property
+    def expressions(self) -> Iterator[str]:
+        """The expressions of its fields and instances."""
+        for each in self.attributes:
+            for key in ("size", "repeat-expr", "if"):
+                yield each.text(key)
+            if each.switch is not None:
+                yield each.switch.text("switch-on")
+        for instance in self.instances.values():
+            yield instance.text("value")
 
     def all(self) -> Iterator[Type]:
         """This type and all inside it."""
@@ -160,7 +235,7 @@ class Type:
         first, *rest = name.split("::")
         scope: Type | None = self
         while scope is not None:
-            found = scope.types.get(first)
+            found = scope.types.get(first) or scope.imported.get(first)
             for each in rest:
                 found = found.types.get(each) if found else None
             if found is not None:
@@ -175,41 +250,69 @@ class Type:
         while scope is not None:
             holder: Type | None = scope
             for each in path:
-                holder = holder.types.get(each) if holder else None
+                holder = holder.types.get(each) or holder.imported.get(each) if holder else None
             if holder is not None and last in holder.enums:
-                return f"{holder.name}::{last}" if holder.outer else last, holder.enums[last]
+                return f"{holder.name}::{last}" if holder.name else last, holder.enums[last]
             scope = scope.outer
         return None
 
 
-def read_tree(text: str, notes: Notes) -> Type:
-    """The outermost type.
+def read_tree(path: FilePath, notes: Notes) -> Type:
+    """The outermost type of a file, with those of the files of the same folder that it imports.
 
     Raises:
-        ImportFileError: the text is not YAML, or not a Kaitai Struct file.
+        ImportFileError: a file cannot be read, is not YAML, or not a Kaitai Struct file.
     """
-    source = parse(text)
+    read: dict[str, Type] = {}
+    root = read[path.name] = _read(path, "", notes)
+    waiting = [root]
+    while waiting:
+        importing = waiting.pop()
+        meta = importing.node.get("meta")
+        for each in meta.listing("imports") if meta else ():
+            name = each.word
+            file = f"{name}.ksy"
+            if not name or file != FilePath(file).name:
+                importing.notes.add(each.line, f"'{name[:60]}' is not imported: it is not beside this file")
+                continue
+            if file not in read:
+                if len(read) >= _MOST_FILES:
+                    raise notes.error(0, f"more than {_MOST_FILES} files are imported")
+                try:
+                    own = notes.of(os.fspath(FilePath(notes.file).with_name(file)))
+                    read[file] = _read(path.with_name(file), name, own)
+                except Unreadable as error:
+                    importing.notes.add(each.line, f"'{name[:60]}' is not imported: {error.message}")
+                    continue
+                waiting.append(read[file])
+            importing.imported[name] = read[file]
+    return root
+
+
+def _read(path: FilePath, name: str, notes: Notes) -> Type:
+    source = parse(text_of(content(path), notes))
     for fault in source.faults:
         if fault.rule == "duplicate-key":
             notes.add(fault.position.line, fault.message)
         else:
             raise notes.error(fault.position.line, f"this is not YAML: {fault.message}")
-    root = Node(source.data, (), source)
+    root = Node(source.data, (), source, notes)
     meta = root.get("meta")
     if meta is None or not (meta.text("id") or root.get("seq")):
         raise notes.error(1, "this is not a Kaitai Struct file: it has no meta with an id")
-    for imported in (Node(meta.value, meta.path, source).get("imports") or Node(None, (), source)).listed:
-        notes.add(imported.line, f"'{imported.word[:60]}' is not imported: types of other files are unknown")
-    return _type("", root, None, notes)
+    found = _type(name, root, None)
+    texts = " ".join(each for type_ in found.all() for each in type_.expressions)
+    found.asked = frozenset(_ASKED.findall(texts))
+    return found
 
 
-def _type(name: str, node: Node, outer: Type | None, notes: Notes, depth: int = 0) -> Type:
+def _type(name: str, node: Node, outer: Type | None, depth: int = 0) -> Type:
     if depth > _DEEPEST:
-        raise notes.error(node.line, f"types are nested more than {_DEEPEST} deep")
+        raise node.notes.error(node.line, f"types are nested more than {_DEEPEST} deep")
     meta = node.get("meta")
     endian = meta.get("endian") if meta else None
     if endian is not None and not endian.word:
-        notes.add(endian.line, "a byte order that values decide is not taken")
+        node.notes.add(endian.line, "a byte order that values decide is not taken")
 
     def of(key: str, inherited: str) -> str:
         return (meta.text(key) if meta else "") or inherited
@@ -222,33 +325,40 @@ def _type(name: str, node: Node, outer: Type | None, notes: Notes, depth: int = 
         of("bit-endian", outer.bit_endian if outer else "be"),
         of("encoding", outer.encoding if outer else ""),
     )
-    for each, value in (node.get("instances") or Node(None, (), node.source)).items:
-        notes.add(value.line, f"instance {each[:60]} is left out: it is computed, or at a place of its own")
-    for value in (node.get("params") or Node(None, (), node.source)).listed:
-        notes.add(value.line, f"parameter {value.text('id')[:60]} is left out: it is not on the line")
-    for at, value in enumerate((node.get("seq") or Node(None, (), node.source)).listed):
-        found.attributes.append(_attribute(value, at))
-    for each, value in (node.get("enums") or Node(None, (), node.source)).items:
+    for each, value in node.mapping("instances"):
+        found.instances[each] = value
+        node.notes.add(
+            value.line, f"instance {each[:60]} is left out: it is computed, or at a place of its own"
+        )
+    for value in node.listing("params"):
+        node.notes.add(value.line, f"parameter {value.text('id')[:60]} is left out: it is not on the line")
+    for at, value in enumerate(node.listing("seq")):
+        found.attributes.append(_attribute(value, at, found))
+    for each, value in node.mapping("enums"):
         found.enums[each] = value
-    for each, value in (node.get("types") or Node(None, (), node.source)).items:
+    for each, value in node.mapping("types"):
         full = f"{name}::{each}" if name else each
-        found.types[each] = _type(full, value, found, notes, depth + 1)
+        found.types[each] = _type(full, value, found, depth + 1)
     return found
 
 
-def _attribute(node: Node, at: int) -> Attribute:
+def _attribute(node: Node, at: int, scope: Type) -> Attribute:
     name = node.text("id") or f"unnamed_{at}"
     if not isinstance(node.value, dict):
-        return Attribute(name, node, "it is not a mapping")
+        return Attribute(name, node, scope, "it is not a mapping")
     for key, reason in _REFUSED.items():
         if key in node.value:
-            return Attribute(name, node, reason)
+            return Attribute(name, node, scope, reason)
     for key in node.value:
         if key not in _KNOWN and not key.startswith("-"):
-            return Attribute(name, node, f"the key '{key[:40]}' is not known")
+            return Attribute(name, node, scope, f"the key '{key[:40]}' is not known")
     if node.text("consume") == "false" or node.text("include") == "true" or node.text("eos-error") == "false":
-        return Attribute(name, node, "a terminator that is kept or may be missing is not taken")
-    return Attribute(name, node)
+        return Attribute(name, node, scope, "a terminator that is kept or may be missing is not taken")
+    if process := node.text("process"):
+        if not node.text("size") and not node.text("size-eos"):
+            return Attribute(name, node, scope, "a process is code, and the number of bytes is not stated")
+        node.notes.add(node.line, f"{name[:60]} is a byte string: the process {process[:40]} is code")
+    return Attribute(name, node, scope)
 
 
 def _doc(node: Node) -> str:

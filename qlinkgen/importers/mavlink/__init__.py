@@ -121,6 +121,7 @@ def _message(
         message.line,
         {"id": message.id, "attributes": {"crc_extra": crc_extra(message)}},
         described(message.element),
+        message.notes,
     )
 
 

@@ -64,7 +64,7 @@ class Enums:
             return None
         called = self._names.take(name if not self._is_made(name) else f"{name}_{type_}", first.line, own)
         doc = next((each.text_of("description") for each, _ in elements if each.has("description")), "")
-        return Constants(called, type_, values, first.line, doc, "bit" if bits else "value")
+        return Constants(called, type_, values, first.line, doc, "bit" if bits else "value", own)
 
     def _is_made(self, name: str) -> bool:
         return any(each == name for each, _ in self._made)
