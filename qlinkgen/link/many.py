@@ -25,10 +25,12 @@ class Answers:
         nodes: the nodes of which each sends one, None if something else ends them.
     """
 
-    __slots__ = ("_by", "_found", "_last", "_many", "items", "nodes")
+    __slots__ = ("_alone", "_by", "_found", "_last", "_many", "items", "nodes")
 
-    def __init__(self, many: Many, request: Framed) -> None:
+    def __init__(self, many: Many, request: Framed, *, alone: bool = False) -> None:
+        """``alone``: one node was asked with a command that all nodes answer for a time."""
         self._many = many
+        self._alone = alone and many.within is not None
         self.nodes = nodes_asked(many, request)
         self._by: str = getattr(many, "by", "")
         self._found: dict[int, Framed] = {}
@@ -41,7 +43,7 @@ class Answers:
     @property
     def timed(self) -> bool:
         """Whether a time ends them."""
-        return self._many.within is not None
+        return self._many.within is not None and not self._alone
 
     @property
     def further(self) -> int:
@@ -70,7 +72,7 @@ class Answers:
         if self._many.until is not None:
             name, first, last = self._many.until
             return first <= int(getattr(answer, name)) <= last
-        return len(self.items) == self._last
+        return self._alone or len(self.items) == self._last
 
     def ended_by(self, reply: Framed) -> bool:
         """Whether a reply follows the last answer."""

@@ -29,6 +29,7 @@ from qlinkgen.link.codec import (
     Decoder,
     Fault,
     Framed,
+    Many,
     OtherReply,
     address_getter,
     cut,
@@ -366,12 +367,19 @@ class MasterEngine:
             self._go_on(self._dialogue, now, on_wire)
             return frame
         if command.many is not None:
-            answers = self._answers
-            if answers is None or answers.nodes is None:  # a repeat asks for those that are missing
-                self._answers = answers = Answers(command.many, pending.request)
-            self._deadline += self.timing.duration(command.many) + answers.further * command.answer_time
+            self._await_several(pending, command.many)
         self._state = _SENT[self._state]
         return frame
+
+    def _await_several(self, pending: Pending, many: Many) -> None:
+        """Begin to take several answers, or go on with those that a repeat is to complete."""
+        command, answers = pending.command, self._answers
+        if answers is None or answers.nodes is None:
+            alone = command.answers_broadcast and not pending.to_all
+            self._answers = answers = Answers(many, pending.request, alone=alone)
+        if answers.timed:
+            self._deadline += self.timing.duration(many)
+        self._deadline += answers.further * command.answer_time
 
     def _send_next(self, now: float) -> bytes:
         """Send the next frame of a dialogue."""

@@ -75,12 +75,12 @@ class _Pending:
         "sent_as",
     )  # fmt: skip
 
-    def __init__(self, command: Command, request: Framed, at: float, deadline: float) -> None:
+    def __init__(self, command: Command, request: Framed, at: float, deadline: float, *, alone: bool) -> None:
         self.command = command
         self.request = request
         self.at = at
         self.deadline = deadline
-        self.answers = Answers(command.many, request) if command.many is not None else None
+        self.answers = Answers(command.many, request, alone=alone) if command.many is not None else None
         self.answered = command.response is None
         self.reported = self.answered
         #: The dialogue, None for a request and its response and after the end.
@@ -310,11 +310,14 @@ class Monitor:
                 self.heard.append(Unanswered(now, before.sent))
         repeat = before is not None and not before.answered and before.request == request
         unanswerable = not addresses_that_answer(command, request, self._codec.BUS)
-        pending = _Pending(command, request, now, now + self._timing.deadline(command, 0))
+        to_all = address_of(request) == self._codec.BUS.broadcast
+        alone = command.addressing == "answered_broadcast" and not to_all
+        deadline = now + self._timing.deadline(command, 0)
+        pending = _Pending(command, request, now, deadline, alone=alone)
         self._asking.insert(0, pending)
-        if command.many is not None:
-            pending.deadline += self._timing.duration(command.many)
         if pending.answers is not None:
+            if command.many is not None and pending.answers.timed:
+                pending.deadline += self._timing.duration(command.many)
             pending.deadline += pending.answers.further * self._timing.deadline(command, 0)
         pending.answered = pending.reported = unanswerable
         if pending.dialogue is not None:

@@ -109,6 +109,16 @@ def test_all_that_come_in_a_time(log: ModuleType, engine: MasterEngine) -> None:
     assert len(run.sent) == 1
 
 
+def test_a_node_that_is_asked_alone_answers_once(log: ModuleType, engine: MasterEngine) -> None:
+    run = drive(engine, log.ScanRequest(node=5), arrivals([log.ScanResponse(node=5, value=5)]))
+    assert values(run.response) == [5]
+    assert run.end < 0.02
+    monitor = Monitor(log, engine.timing)
+    monitor.receive(log.ScanRequest(node=5).to_frame(), 0.005)
+    monitor.handle_timer(0.1)
+    assert [type(event).__name__ for event in monitor.heard] == ["Asked", "Unanswered"]
+
+
 def test_nobody_answers_in_the_time(log: ModuleType, engine: MasterEngine) -> None:
     assert isinstance(drive(engine, log.ScanRequest(node=0), attempts=1).error, NoReply)
 
