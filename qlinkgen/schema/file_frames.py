@@ -217,6 +217,24 @@ class _PartForms:
 Parts = dict[str, Annotated[PartSpec, BeforeValidator(_PartForms.expanded), _PartForms]]
 
 
+class PartTypeSpec(Fact):
+    """A named type of parts, some of whose bits have roles; it takes the place of its name in a part."""
+
+    type: str = Field(description="Integer type: u8, u16 ... u64")
+    byteorder: Order | None = Field(default=None, description="Overrides the byte order of the file")
+    bits: dict[str, Annotated[PartBitSpec, ShortForm("at", "integer", "string")]] = Field(
+        min_length=1, description="Roles of the bits of the integer"
+    )
+
+
+class OrPartType:
+    """Describes the types of parts, which a file no longer has when it is checked."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"anyOf": [handler(core), handler(PartTypeSpec.__pydantic_core_schema__)]}
+
+
 class StuffingSpec(FileMapping):
     """Inserts a byte after each occurrence of a pattern; ``coding`` can say the same."""
 

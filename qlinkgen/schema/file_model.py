@@ -14,7 +14,7 @@ from pydantic.json_schema import JsonSchemaValue
 from qlinkgen.schema.file_base import FileMapping
 from qlinkgen.schema.file_commands import CommandSpec, DefaultsSpec, MessageSpec, Replies
 from qlinkgen.schema.file_fields import EnumSpec, FlagsSpec, GroupSpec, TypeSpec
-from qlinkgen.schema.file_frames import FrameSpec, KindSpec
+from qlinkgen.schema.file_frames import FrameSpec, KindSpec, OrPartType
 from qlinkgen.schema.kinds import Count, Id, Label, Name, NumberOrName, Order, Text, Time, WholeRange
 
 
@@ -74,7 +74,9 @@ class SchemaFile(FileMapping):
     )
     enums: dict[str, EnumSpec] = Field(default_factory=dict, description="Named numbers")
     flags: dict[str, FlagsSpec] = Field(default_factory=dict, description="Named bits")
-    types: dict[str, TypeSpec] = Field(default_factory=dict, description="Named types of fields, and records")
+    types: dict[str, Annotated[TypeSpec, OrPartType]] = Field(
+        default_factory=dict, description="Named types of fields and of parts, and records"
+    )
     frame: FrameSpec = Field(
         default_factory=FrameSpec, description="The frame around each message, unless there are several kinds"
     )

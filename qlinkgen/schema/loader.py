@@ -24,6 +24,7 @@ from qlinkgen.schema.kind_messages import message_builder
 from qlinkgen.schema.names import check_names
 from qlinkgen.schema.notation import Version
 from qlinkgen.schema.notation import version as as_version
+from qlinkgen.schema.part_types import place_part_types
 from qlinkgen.schema.reading import read_regular, reason_of
 from qlinkgen.schema.report import Reporter, did_you_mean
 from qlinkgen.schema.seeds import check_references, check_types
@@ -92,6 +93,7 @@ def _versions(path: FilePath, faults: Sequence[Fault]) -> tuple[Version, ...]:
     source = parse(read_regular(path))
     report = Reporter(str(path), source)
     include(source, report)
+    place_part_types(source, report)
     file = check_structure(source.data, report)
     return boundaries(file) if file else ()
 
@@ -125,6 +127,7 @@ def loads(
     if any(fault.rule == "yaml-syntax" for fault in source.faults):
         return None, report.faults
     texts = (text, *include(source, report))
+    place_part_types(source, report)
     chosen = None if version is None else as_version(version)
     protocol = _build(source.data, report, "".join(texts), FilePath(file).name, crc=crc, version=chosen)
     return protocol if not report.failed else None, report.faults

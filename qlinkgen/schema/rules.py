@@ -161,6 +161,11 @@ _ALL = (
         "the other passes over, for which frames have an end and a check value of their own.",
     ),
     Rule(
+        "part-type",
+        "A named type with roles is that of parts of frames.",
+        "A role says what the engine does with bits of a frame; a field of a message has none.",
+    ),
+    Rule(
         "part-direction",
         "A part whose `if` names the direction is in all frames of one direction, and in none of the other.",
         "Nothing else decides, and one receiver finds the frames of both: they begin alike and have "

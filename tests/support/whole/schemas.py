@@ -105,6 +105,8 @@ class _Maker:
         if shape.bus == "master_slave" and shape.master is None and self.seed % _LINK == 1:
             _link(rng, document)
         maker.forget_unused(document)
+        if not several:
+            _name_parts(rng, document)
         return document
 
     def _kinds(self, several: Kinds, maker: FieldMaker, bus: Doc) -> Doc:
@@ -590,6 +592,18 @@ def _passed_over(document: Doc) -> bool:
     seeded = any(str(each).startswith("attribute.") for over in checks for each in over)
     plain = "to_unknown" not in document and not any("if" in spec for spec in specs)
     return ended and bool(checks) and not seeded and plain
+
+
+def _name_parts(rng: random.Random, document: Doc) -> None:
+    """Write bits with roles as a named type, in some schemas; its part may have keys of its own."""
+    parts: Doc = document["frame"].get("parts", {})
+    for name, spec in parts.items():
+        if not isinstance(spec, dict) or "'role'" not in str(spec.get("bits")) or rng.random() < 0.6:
+            continue
+        own = {key: spec[key] for key in ("if", "byteorder") if key in spec}
+        kind = {key: each for key, each in spec.items() if key not in own}
+        document.setdefault("types", {})["head_type"] = kind
+        parts[name] = {**own, "type": "head_type"} if own or rng.random() < 0.5 else "head_type"
 
 
 # YAML

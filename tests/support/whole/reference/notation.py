@@ -59,9 +59,24 @@ def _newest(node: Any) -> Any:
     }
 
 
+def _named(document: Doc) -> None:
+    """Replace the names of types of parts by these, which fields do not have."""
+    types = document.get("types", {})
+    for frame in (document.get("frame", {}), *document.get("frames", {}).values()):
+        parts = frame.get("parts", {})
+        for name, spec in parts.items():
+            kind = spec.get("type") if isinstance(spec, dict) else spec
+            given = types.get(kind) if isinstance(kind, str) else None
+            if given and "'role'" in str(given.get("bits")):
+                own = {key: each for key, each in spec.items() if key != "type"} if spec != kind else {}
+                parts[name] = {**given, **own}
+    document["types"] = {name: each for name, each in types.items() if "'role'" not in str(each.get("bits"))}
+
+
 def load(text: str) -> Doc:
     """The plain data of a schema file."""
     document: Doc = _newest(yaml.load(text, _Loader))
+    _named(document)
     parts = document.get("frame", {}).get("parts", {})
     # Silence has no bytes, and frames end without it unless nothing else ends them.
     for name in [
