@@ -38,6 +38,11 @@ class Layout:
         """Whether the size is constant."""
         return all(each.fixed for each in self.fields)
 
+    @property
+    def open(self) -> bool:
+        """Whether a field takes the rest of the bytes."""
+        return any(each.open for each in self.fields)
+
     @cached_property
     def values(self) -> tuple[Value, ...]:
         """Values in wire order."""
@@ -111,6 +116,20 @@ class Field:
     #: The value of which it is a case, and the name of the case; "" for other fields.
     slot: str = ""
     case: str = ""
+    #: A count tells the bytes of that value.
+    counted: bool = False
+
+    @property
+    def open(self) -> bool:
+        """Whether it takes the rest of the payload."""
+        kind = self.type
+        if self.counted or self.terminated:
+            return False
+        if isinstance(kind, Record):
+            return kind.layout.open
+        if not isinstance(kind, Blob | Array | Records) or kind.length.fixed or kind.length.counted_by:
+            return False
+        return not isinstance(kind, Records) or not kind.last
 
     @property
     def conditional(self) -> bool:

@@ -169,7 +169,8 @@ def _pack_walked(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
                 raise Unsendable(each.name, values[each.name])
         data += _segment(segment, values, counts, sizes) if sent else b""
     if len(data) > plan.most:
-        field = next(step for segment in plan.segments if (step := segment.records))
+        long = [step for segment in plan.segments if (step := segment.records)]
+        field = next((step for step in long if values[step.name] is not None), long[0])
         raise Unsendable(field.name, values[field.name])
     return data
 

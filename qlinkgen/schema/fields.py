@@ -116,6 +116,7 @@ class FieldBuilder:
                             "bad-count", place, what, hint, needs=(place[:-1], (*path, count.run))
                         )
                     counters.setdefault(count.run, field.name)
+        fields = [replace(each, counted=bool(each.slot) and each.slot in counters) for each in fields]
         return [_with_counter(field, counters.get(field.slot or field.name)) for field in fields]
 
     def _whole(self, fields: Sequence[Field], name: str, path: Path) -> Sequence[Field]:
@@ -181,7 +182,7 @@ class FieldBuilder:
 
     def _check_open_ends(self, fields: Sequence[Field], path: Path) -> None:
         self._check_packed(fields, path)
-        open_fields = [field for field in fields if is_open(field)]
+        open_fields = [field for field in fields if field.open]
         open_ends = [field.name for field in open_fields]
         # An integer with an error may be the count of one of them.
         counts = [(*path, field.name) for field in fields if isinstance(field.type, Scalar)]
@@ -199,12 +200,15 @@ class FieldBuilder:
             self._report.taint((*path, name))
         for field in open_fields:
             later = fields[fields.index(field) + 1 :]
-            varied = (each for each in later if each.terminated or each.walked)
+            single = isinstance(field.type, Record)
+            varied = (each for each in later if each.terminated or each.walked or single)
             ended = (each for each in varied if not exclusive(each.when, field.when))
             if other := next(ended, None):
                 what = f"{field.name} takes the rest of the payload, before {other.name}, whose size varies"
+                what = f"{field.name} takes the rest of the payload, before {other.name}" if single else what
                 both = ((*path, field.name), (*path, other.name), *counts)
-                hint = f"move {other.name} before it, or give {field.name} a count"
+                counted = "the field in it" if single else field.name
+                hint = f"move {other.name} before it, or give {counted} a count"
                 self._report.error("two-open-ends", (*path, other.name), what, hint, of_key=True, needs=both)
         if open_ends:
             self._check_later_counts(open_ends[0], fields, path, counts)
@@ -213,7 +217,7 @@ class FieldBuilder:
         """Check that a packed array of variable size has a count."""
         counts = [(*path, field.name) for field in fields if isinstance(field.type, Scalar)]
         for field in fields:
-            if is_open(field) and _is_row(field.type):
+            if field.open and _is_row(field.type):
                 what = f"the size of the payload does not tell the number of items of {field.name}"
                 hint = f"add a field with counts: {field.name} before it, or use a fixed number"
                 place = (*path, field.name)
@@ -295,14 +299,3 @@ def _is_countable(kind: FieldType) -> bool:
 
 def _is_row(kind: FieldType) -> bool:
     return isinstance(kind, Array) and kind.packed is not None
-
-
-def is_open(field: Field) -> bool:
-    """Whether the field takes the rest of the payload."""
-    return (
-        isinstance(field.type, Blob | Array | Records)
-        and not field.type.length.fixed
-        and not field.type.length.counted_by
-        and not field.terminated
-        and not (isinstance(field.type, Records) and field.type.last)
-    )

@@ -12,7 +12,7 @@ from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.transaction import Addressing, Bus
 from qlinkgen.model.types import Array, Bits, Blob, Chunk, Scalar
 from qlinkgen.schema.asked import AskedBuilder
-from qlinkgen.schema.fields import FieldBuilder, is_open
+from qlinkgen.schema.fields import FieldBuilder
 from qlinkgen.schema.file_base import Fact
 from qlinkgen.schema.file_commands import CommandSpec, MessageSpec
 from qlinkgen.schema.file_fields import Fields
@@ -338,7 +338,7 @@ class MessageBuilder:
         if isinstance(self._frame, DelimitedFrame) and self._frame.tells_end:
             return
         for field in message.fields:
-            if (is_open(field) or _has_terminator(field)) and not message.separator:
+            if (field.open or _has_terminator(field)) and not message.separator:
                 neither = f"neither the frame nor {message.name} has a length"
                 what = f"the end of {field.name} is unknown: {neither}"
                 hint = "give it a count or a fixed size, or give the frame a length or terminator"
@@ -381,7 +381,7 @@ class MessageBuilder:
 
     def _check_words(self, message: Message, word: int, path: Path) -> None:
         for field in message.fields:
-            if not field.fixed and not is_open(field):
+            if not field.fixed and (field.walked or not field.open):
                 what = f"{field.name} has no fixed size"
                 hint = "packets have no length; give each field a fixed size"
                 self._error("bad-packet", (*path, field.name), what, hint)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from qlinkgen.model.condition import Condition
 from qlinkgen.model.fields import Field, Layout, Record, Records
-from qlinkgen.model.types import Array, Blob, Length, Scalar
+from qlinkgen.model.types import Array, Length, Scalar
 from qlinkgen.schema.compounds import build_length
 from qlinkgen.schema.conditions import EndBuilder
 from qlinkgen.schema.file_base import Fact, Lifetime
@@ -70,6 +70,10 @@ class RecordBuilder:
             return None
         if text.count is None:
             return Record(layout)
+        if layout.open:
+            rest = next(each.slot or each.name for each in layout.fields if each.open)
+            what = f"{rest} takes the rest of the payload, so that a second {layout.name} has no bytes"
+            location.fault("bad-record", "type", what, f"put a count before {rest}, or use one {layout.name}")
         length = build_length(text, 8 * layout.least, payload_max, location)
         if length is None:
             self._report.taint(location.path)
@@ -128,11 +132,6 @@ class RecordBuilder:
             self._report.error("bad-record", path, what, hint, of_key=True, needs=((*path, "fields"),))
         for field in layout.fields:
             place = (*path, "fields", field.name)
-            if _takes_rest(field):
-                name = field.slot or field.name
-                what = f"{name} takes the rest of the payload, which a record {layout.name} does not know"
-                hint = "put a count before it, or give it a number of items, like [4]"
-                self._report.error("bad-record", place, what, hint, of_key=True)
             if isinstance(field.type, Array) and field.type.packed and not field.type.length.fixed:
                 what = f"{field.name} is packed and of variable size, in a record"
                 self._report.error("bad-record", place, what, "give it a fixed number of items", of_key=True)
@@ -146,15 +145,6 @@ class RecordBuilder:
                 what = f"{field.name} would be a record inside of {_MAX_DEPTH} others"
                 hint = "use fields in place of one of the records"
                 self._report.error("extent-depth", place, what, hint, of_key=True)
-
-
-def _takes_rest(field: Field) -> bool:
-    kind = field.type
-    if not isinstance(kind, Blob | Array | Records) or kind.length.fixed or kind.length.counted_by:
-        return False
-    if field.terminated:
-        return False
-    return not isinstance(kind, Records) or not kind.last
 
 
 def _depth(fields: tuple[Field, ...]) -> int:

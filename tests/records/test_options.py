@@ -33,6 +33,7 @@ types:
           7: "u16[0..2]"
           8: {number: u8, name: {type: "text[1..4]", terminator: 00}}
         default: "bytes[0..4]"
+  tail: {fields: {first: u8, rest: "bytes[0..4]", last: u8}}
   advert:
     fields:
       size: {type: u8, counts: [tag, data]}
@@ -55,12 +56,17 @@ commands:
   adverts:
     id: 2
     request: {adverts: "advert[0..9]"}
+    response: {number: u8, tail: tail}
+  values:
+    id: 3
+    request: {}
     response:
       kind: u8
       size: {type: u8, counts: value}
       value: {switch: kind, cases: {1: u16, 2: option}, default: {}}
       end: u8
 """
+TAIL: Raw = {"first": 1, "rest": b"\x02\x03", "last": 4}
 MRU: dict[str, Raw] = {"kind": 1, "value": {"mru": 1500}}
 MAGIC: dict[str, Raw] = {"kind": 5, "value": 7}
 NAMED: dict[str, Raw] = {"kind": 8, "value": {"number": 2, "name": b"ab"}}
@@ -70,8 +76,9 @@ CASES: list[tuple[str, dict[str, Raw], str]] = [
     ("options.request", {"options": [NAMED, {"kind": 6, "value": None}]}, "0806 02 616200 0602"),
     ("options.response", {"options": [{"kind": 7, "value": [1, 2]}], "end": 3}, "06 0706 0001 0002 03"),
     ("adverts.request", {"adverts": [{"tag": 1, "data": 4}, {"tag": 9, "data": b""}]}, "02 01 04 01 09"),
-    ("adverts.response", {"kind": 2, "value": MRU, "end": 3}, "02 04 0104 05DC 03"),
-    ("adverts.response", {"kind": 7, "value": None, "end": 3}, "07 00 03"),
+    ("adverts.response", {"number": 9, "tail": TAIL}, "09 01 0203 04"),
+    ("values.response", {"kind": 2, "value": MRU, "end": 3}, "02 04 0104 05DC 03"),
+    ("values.response", {"kind": 7, "value": None, "end": 3}, "07 00 03"),
 ]
 WRONG = [
     ("options.request", "0103 05", "length"),
@@ -86,8 +93,10 @@ WRONG = [
     ("options.request", "0101", "length"),
     ("options.request", "0907 0000000000", "length"),
     ("options.response", "05 0706 0001 0002 03", "length"),
-    ("adverts.response", "07 01 00 03", "length"),
-    ("adverts.response", "02 05 0104 05DC 03", "length"),
+    ("adverts.response", "09 01", "length"),
+    ("adverts.response", "09 01 0203 0405 06 07", "length"),
+    ("values.response", "07 01 00 03", "length"),
+    ("values.response", "02 05 0104 05DC 03", "length"),
 ]
 
 
@@ -119,7 +128,7 @@ def test_both_ways(name: str, values: dict[str, Raw], data: str) -> None:
     assert unpack(payload, wire) == values
     assert module().MESSAGES[name].from_bytes(wire).to_bytes() == wire
     assert live().payload(name, live().messages[name].parse(wire)) == wire
-    assert measure(payload_of("adverts.response"), b"\x02\x04") == 7
+    assert measure(payload_of("values.response"), b"\x02\x04") == 7
 
 
 @pytest.mark.parametrize(("name", "data", "kind"), WRONG)

@@ -4,21 +4,31 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TypeAlias, assert_never
 
-from qlinkgen.model.fields import Layout, Record, Records, Value
+from qlinkgen.model.fields import Layout, Record, Records, Value, applies
 from qlinkgen.model.frame import DelimitedFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Flags, Float, Length, Scalar
 
-Raw: TypeAlias = "int | list[int] | bytes | Mapping[str, Raw] | list[Mapping[str, Raw]]"
+Raw: TypeAlias = "int | list[int] | bytes | Mapping[str, Raw] | list[Mapping[str, Raw]] | None"
 
 
 def random_values(message: Message, rng: random.Random) -> list[Raw]:
     """Legal raw values of a message, often bounds."""
     return [_random(value, rng) for value in message.values]
+
+
+def random_present(values: Iterable[Value], rng: random.Random) -> dict[str, Raw]:
+    """Legal raw values by name; those that are absent are None, of a choice that of its case."""
+    found: dict[str, Raw] = {}
+    for value in values:
+        sent = applies(value.field.when, found.get)
+        if sent or found.get(value.name) is None:
+            found[value.name] = _random(value, rng) if sent else None
+    return found
 
 
 def random_beside(protocol: Protocol, message: Message, rng: random.Random) -> dict[str, Raw]:
@@ -75,6 +85,7 @@ def _random(value: Value, rng: random.Random) -> Raw:
                 rng.choice((rng.randrange(256), 0xA5, 0x00, 0xFF, 0xFD)) & (0x7F if kind.text else 0xFF)
                 for _ in range(size)
             )
+            data = data.replace(kind.terminator, b"_") if kind.terminator else data
             return data.rstrip(kind.pad) if kind.pad else data
         case Record():
             return _record(kind.layout, rng)
@@ -85,7 +96,7 @@ def _random(value: Value, rng: random.Random) -> Raw:
 
 
 def _record(layout: Layout, rng: random.Random) -> Mapping[str, Raw]:
-    return {value.name: _random(value, rng) for value in layout.values}
+    return random_present(layout.values, rng)
 
 
 def _size(length: Length, rng: random.Random) -> int:

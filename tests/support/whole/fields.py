@@ -377,7 +377,7 @@ class FieldMaker:
     def _case(self, room: Room, *, last: bool = False) -> tuple[Any, int]:
         """What a choice is in one case, and its size."""
         rng, roll = self.rng, self.rng.random()
-        if last and roll < 0.5 and room.left > 8:
+        if last and roll > 0.6 and room.left > 8:
             most = rng.choice((3, room.left - 4))
             return (f"text[0..{most}]" if self.shape.groups else f"bytes[0..{most}]"), most
         if roll < 0.1:
@@ -387,7 +387,11 @@ class FieldMaker:
         if roll < 0.4:
             taken = set[str]()
             parts = [(self.words.name(taken), self._plain()) for _ in range(rng.choice((1, 2, 3)))]
-            return {name: spec for name, (spec, _) in parts}, sum(size for _, (_, size) in parts)
+            fields, size = {name: spec for name, (spec, _) in parts}, sum(size for _, (_, size) in parts)
+            if last and rng.random() < 0.5 and size + 3 < room.left:
+                fields[self.words.name(taken)] = f"{'text' if self.shape.groups else 'bytes'}[0..3]"
+                size += 3
+            return fields, size
         if roll < 0.5:
             return self._fixed_run()
         while True:
