@@ -25,7 +25,7 @@ from qlinkgen.plan import Plan, plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.schema import find, library, load
 from qlinkgen.schema.including import GROUPS
-from tests.support.random_raw import random_address, random_beside, random_values
+from tests.support.random_raw import random_address, random_beside, random_present
 
 #: A message as `qlinkgen decode` prints it.
 Record = Mapping[str, Any]
@@ -96,7 +96,7 @@ class Described:
 
     def wire(self, message: Message, rng: random.Random) -> bytes:
         """A frame of random values, made by the interpreter."""
-        values = dict(zip((each.name for each in message.values), random_values(message, rng), strict=True))
+        values = random_present(message.values, rng)
         values |= random_beside(self.model, message, rng)
         address = random_address(message, rng) if message.addresses else None
         return Codec(self.plan).encode(message.name, values, address)

@@ -10,6 +10,7 @@ from tests.library.protocols import Record
 #: Longer frames may not fit its buffer.
 _MOST = 516
 _NAMES = {b"\x00\x21": "ipv4", b"\x00\x57": "ipv6"}
+_LINK_CONTROL = b"\xc0\x21"
 UNKNOWN: frozenset[str] = frozenset()
 
 
@@ -21,4 +22,6 @@ def read(wire: bytes, direction: Direction) -> Record | None:
     if len(wire) > _MOST:
         return None
     data, _, _ = yahdlc.get_data(wire)
+    if data[:2] == _LINK_CONTROL:
+        return {"message": "lcp", "fields": {"identifier": data[3]}}
     return {"message": _NAMES[data[:2]], "fields": {"datagram": data[2:].hex()}}
