@@ -8,6 +8,7 @@ from typing import assert_never
 from qlinkgen.cli.crc_search import Coverage, coverages, explain_mismatch, explain_sum
 from qlinkgen.cli.describe import addresses_text
 from qlinkgen.cli.span_text import check_number
+from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.describe import (
     bytes_text,
     check_text,
@@ -184,6 +185,7 @@ def _stuffing(found: Dissection, fault: Fault, at: int) -> Words:
         seen = "the end of the coded bytes" if fault.seen is None else f"{fault.seen:02x}"
         return f"{seen} at offset {at} is wrong: {transparency_text(found.frame)}", _LOST
     assert isinstance(way, FrameStuffing | PayloadStuffing)
+    assert isinstance(way.rule, Insertion)
     seen = "the end of the payload" if fault.seen is None else f"{fault.seen:02x}"
     after = f"{way.rule.after.hex(' ')} at offset {at - len(way.rule.after)}"
     rule = f"{after} is followed by {seen}, not by {way.rule.insert:02x}"

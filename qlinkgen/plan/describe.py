@@ -548,8 +548,8 @@ def transparency_text(frame: FramePlan) -> str:
             rule = f"a byte {way.rule.insert:02X} is inserted after every {_after_text(way)}"
             return f"{rule}, after the checksum is computed" + (f"; not in {exempt}" if exempt else "")
         case PayloadStuffing():
-            rule = f"a byte {way.rule.insert:02X} is inserted after every {_after_text(way)}"
-            return f"{rule} in {envelope.payload.name}, before length and checksum are computed"
+            rule = f"{_stage_text(way.rule)} in {envelope.payload.name}"
+            return f"{rule}, before length and checksum are computed"
         case Coded(stages=()):
             return "bytes are sent as they are"
         case Coded():
@@ -581,7 +581,7 @@ def _stage_text(coding: Stage) -> str:
             assert_never(coding)
 
 
-def _after_text(way: FrameStuffing | PayloadStuffing) -> str:
+def _after_text(way: FrameStuffing) -> str:
     return way.rule.after.hex(" ").upper()
 
 

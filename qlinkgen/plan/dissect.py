@@ -15,7 +15,7 @@ from typing import assert_never
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec
-from qlinkgen.plan.coding import Bytewise
+from qlinkgen.plan.coding import Add, Bytewise
 from qlinkgen.plan.content import BadContent, MoreNeeded, broken, measure
 from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator, Hunt
 from qlinkgen.plan.fields import Fields
@@ -598,6 +598,8 @@ class _Walk:
         """The payload and its offsets without the bytes inserted by payload stuffing."""
         if self.alone is None:
             return cell.data, cell.places
+        if isinstance(self.alone.rule, Add):
+            return self.alone.rule.read(cell.data).plain, cell.places
         inserted = set()
         for at in self.alone.rule.places(cell.data):
             if cell.data[at : at + 1] == bytes((self.alone.rule.insert,)):

@@ -24,7 +24,7 @@ from qlinkgen.model.frame import Part as StatedPart
 from qlinkgen.model.integer import Integer, byte_chunks
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.check import Check
-from qlinkgen.plan.coding import Insertion, stage
+from qlinkgen.plan.coding import Add, Insertion, stage
 from qlinkgen.plan.conditional import conditional
 from qlinkgen.plan.ends import (
     ByKind,
@@ -283,10 +283,12 @@ def _transparency(frame: DelimitedFrame) -> Transparency:
     if not (frame.coding or frame.part("terminator") or frame.ends_idle):
         return Plain()
     coded = _coded(frame)
-    if frame.stuffing is None:
-        return coded
-    rule = Insertion(frame.stuffing.after, frame.stuffing.insert)
-    return PayloadStuffing(rule) if frame.checked_after else FrameStuffing(rule, coded.front, coded.back)
+    rule = coded.stages[0] if coded.stages else None
+    if frame.checked_after and isinstance(rule, Insertion | Add):
+        return PayloadStuffing(rule)
+    if frame.stuffing is not None and isinstance(rule, Insertion):
+        return FrameStuffing(rule, coded.front, coded.back)
+    return coded
 
 
 def _coded(frame: DelimitedFrame) -> Coded:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from qlinkgen.plan.coding import Bytewise, Insertion, Read, Stage
+from qlinkgen.plan.coding import Add, Bytewise, Insertion, Read, Stage
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +58,9 @@ class FrameStuffing:
 
 @dataclass(frozen=True, slots=True)
 class PayloadStuffing:
-    """Only the payload is stuffed; length and check value apply to the stuffed payload."""
+    """Only the payload is stuffed or coded; length and check value apply to the stuffed payload."""
 
-    rule: Insertion
+    rule: Insertion | Add
 
     def most_sent(self, payload: int) -> int:
         """Most bytes that a payload of so many bytes takes on the wire, as far as a length counts them."""
@@ -68,8 +68,8 @@ class PayloadStuffing:
 
     def unstuff(self, sent: bytes) -> bytes | None:
         """The payload without inserted bytes, None if one is missing or wrong."""
-        plain = sent.replace(self.rule.inserted, self.rule.after)
-        return plain if self.rule.encode(plain) == sent else None
+        read = self.rule.read(sent)
+        return read.plain if read.wrong is None else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -90,8 +90,8 @@ class CodingBuilder:
         if known:
             what = "check values of a frame with a terminator or a silence cover the bytes before the coding"
             self._error(place, what, "remove checked: after")
-        elif spec.insert is None:
-            what = "check values cover only inserted bytes, not those of another coding"
+        elif spec.insert is None and spec.add is None:
+            what = "check values cover the coded bytes only of insert and add"
             self._error(place, what, "remove checked: after")
         elif spec.over is not None and spec.over != [payload]:
             what = "lengths and check values cannot cover bytes of themselves"

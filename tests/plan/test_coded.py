@@ -61,6 +61,15 @@ def test_each_byte_is_decoded_when_it_is_read(coding: str, wire: str, wrong: str
     ] == [b"\x7e\x7d"] * 2
 
 
+def test_check_values_may_cover_coded_bytes() -> None:
+    stated = protocol("{add: 33, checked: after}")
+    module, plan, frame = python.load(stated), plan_of(stated), bytes.fromhex("7E 02 01 B1 34 E8 0D")
+    made = module.MESSAGES["go.request"](data=b"\x7e\x01")
+    assert (made.to_frame(), made.to_bytes()) == (frame, b"\x7e\x01")
+    assert [each.data for each in module.StreamDecoder("request").feed(frame)] == [b"\x7e\x01"]
+    assert dissect(plan, frame, "request").faults == ()
+
+
 def test_a_byte_that_is_cut_off_is_missing() -> None:
     plan = plan_of(protocol(CODINGS[0][0]))
     found = dissect(plan, bytes.fromhex("7E 02 01 7D 5E 7D"), "request")

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from qlinkgen.model.message import Direction
 from qlinkgen.plan import Plan
 from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.content import Raw, Unsendable
 from qlinkgen.plan.ends import Rescan
 from qlinkgen.plan.parts import ConstantPart
@@ -24,7 +25,7 @@ def marks(plan: Plan) -> bytes:
     """The bytes that are significant to a receiver."""
     found = b"".join(part.data for part in plan.frame.envelope.parts if isinstance(part, ConstantPart))
     transparency = plan.frame.transparency
-    if isinstance(transparency, FrameStuffing | PayloadStuffing):
+    if isinstance(transparency, FrameStuffing | PayloadStuffing) and isinstance(transparency.rule, Insertion):
         found += transparency.rule.inserted * 3
     if isinstance(transparency, SevenBit):
         found += bytes((transparency.marker, 0x8A, 0x99, 0x88))

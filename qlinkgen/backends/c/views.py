@@ -16,7 +16,7 @@ from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned_type
 from qlinkgen.backends.c.parts import PartWriter, length_bounds
 from qlinkgen.backends.c.places import id_bits, in_hex, sender_of
-from qlinkgen.plan.coding import Insertion
+from qlinkgen.plan.coding import Add, Insertion
 from qlinkgen.plan.ends import ByMessage, ByTerminator, Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
@@ -207,6 +207,7 @@ class PlainView:
         header: size of the header, a variable if ``before`` is not None.
         least_header: the same of a frame without the parts of ``before``.
         overhead: bytes before and after the payload of a frame without conditional parts.
+        added: number added to each byte of the payload before check values are computed, "" without one.
     """
 
     header: str
@@ -222,6 +223,7 @@ class PlainView:
     update_received: list[str]
     head_checks: list[str]
     late_checks: list[str]
+    added: str = ""
 
     @property
     def writes_end(self) -> bool:
@@ -336,12 +338,14 @@ def _parts_views(whole: Plan, plan: Plan, way: str, layouts: Layouts) -> PartsVi
     own = own_prefix(prefix, way)
     writer = PartWriter(prefix, plan.frame, sender, layouts, seeds, passes, own, every)
     envelope, receiver, transparency = plan.frame.envelope, plan.frame.receiver, plan.frame.transparency
-    rule, body_size = None, 0
+    rule, body_size, added = None, 0, ""
     match transparency:
         case Plain():
             body_size = envelope.payload.most if envelope.blocks else 0
         case PayloadStuffing():
-            rule, body_size = transparency.rule, envelope.payload.most_sent
+            coding, body_size = transparency.rule, envelope.payload.most_sent
+            rule = coding if isinstance(coding, Insertion) else None
+            added = in_hex(coding.number) if isinstance(coding, Add) else ""
         case FrameStuffing():
             rule, body_size = transparency.rule, writer.head + envelope.trailer_size + envelope.payload.most
         case Coded():
@@ -358,13 +362,13 @@ def _parts_views(whole: Plan, plan: Plan, way: str, layouts: Layouts) -> PartsVi
         algorithms=list(writer.algorithms.values()),
         f=frame,
         place=PlaceView(
-            tailed=rule is not None or body_size > 0 or envelope.before is not None,
+            tailed=rule is not None or (body_size > 0 and not added) or envelope.before is not None,
             tail=envelope.trailer_size - (envelope.after.size if envelope.after else 0),
             header=envelope.header_size,
             overhead=envelope.least_overhead,
         ),
         parts=parts_view(writer, plan.frame.max_wire),
-        plain=None if stuffing else plain_view(writer, passed),
+        plain=None if stuffing else replace(plain_view(writer, passed), added=added),
         stuffed=_stuffed(writer, stuffing, passed) if stuffing else None,
         inserted=_inserted(rule) if rule else None,
         hunt=_hunted(writer, receiver) if isinstance(receiver, Hunt) else None,

@@ -125,9 +125,13 @@ class Pair(NamedTuple):
 
 
 class Add(NamedTuple):
-    """A number is added to each byte."""
+    """A number is added to each byte.
+
+    As a stuffing it applies to the payload alone, before length and check value are computed.
+    """
 
     number: int
+    over: Sequence[str] = ()
 
     def add(self, data: bytes) -> bytes:
         """The coded bytes."""

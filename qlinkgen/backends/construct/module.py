@@ -392,11 +392,14 @@ def _stuffing(frame: FramePlan) -> tuple[tuple[str, Node], ...]:
                 return ()
             names = tuple(part.name for part in frame.envelope.between(how.front, how.back))
             return ("coding", _stage(how.bytewise)), ("over", Sequence(names))
+        case PayloadStuffing(Add() as rule):
+            return (("stuffing", _stage(rule)),)
         case PayloadStuffing():
             over: tuple[str, ...] = ()
         case FrameStuffing():
             over = tuple(part.name for part in frame.envelope.between(how.front, how.back))
         case _:
             assert_never(how)
+    assert isinstance(how.rule, Insertion)
     given = (how.rule.after, bytes((how.rule.insert,)), *((Sequence(over),) if over else ()))
     return (("stuffing", Call("Stuffing", given)),)

@@ -284,8 +284,8 @@ class PartsView:
 
     @property
     def coding(self) -> CodingView | None:
-        """The coding of its bytes, None if they are sent as they are or stuffed."""
-        way = self.ended or self.stuffing
+        """The coding of its bytes; None if they are stuffed or not coded, or only the payload is."""
+        way = self.ended or (self.stuffing if self.stuffing and self.stuffing.whole else None)
         return way.coding if way else None
 
     @property
@@ -306,7 +306,8 @@ class PartsView:
     @property
     def quick(self) -> bool:
         """Whether a whole frame can be cut out at once: its end and its bytes are not coded."""
-        return not (self.ended or self.blocks or (self.stuffing and self.stuffing.whole))
+        changed = self.stuffing is not None and (self.stuffing.whole or self.stuffing.coding is not None)
+        return not (self.ended or self.blocks or changed)
 
     @property
     def announced(self) -> bool:

@@ -31,7 +31,7 @@ from qlinkgen.model.frame import Silence
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.naming import address_argument, address_attribute
 from qlinkgen.plan.check import Check
-from qlinkgen.plan.coding import Add, Escaping
+from qlinkgen.plan.coding import Add, Escaping, Insertion
 from qlinkgen.plan.ends import ByLength, ByMark, ByTerminator, Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import OneOf, Within
@@ -388,11 +388,14 @@ def _stuffing(plan: Plan) -> StuffingView | None:
             return StuffingView(True, "", "", front, back, coding, reveals, steady=isinstance(stage, Add))
         case FrameStuffing():
             whole, front, back = True, transparency.front, transparency.back
+        case PayloadStuffing(Add()):
+            return StuffingView(False, "", "", 0, 0, coding_view((transparency.rule,)), steady=True)
         case PayloadStuffing():
             whole, front, back = False, 0, 0
         case _:
             assert_never(transparency)
     rule = transparency.rule
+    assert isinstance(rule, Insertion)
     return StuffingView(whole, literal(rule.after), literal(bytes((rule.insert,))), front, back)
 
 

@@ -301,14 +301,14 @@ class _Frame:
                 for at in _lone(rule, wire, self._inserted(wire)):
                     for what, data in _damaged(rule, wire, at):
                         yield self._part_at(cells, wire, at - 1), what, data
-            case PayloadStuffing(rule):
+            case PayloadStuffing(rule) if isinstance(rule, Insertion):
                 sent = rule.encode(pack(plan, filled(rule.after).values(plan)))
                 for at in _lone(rule, sent, rule.places(sent)):
                     for what, data in _damaged(rule, sent, at):
                         cells = self._codec.cells(self._message, data, address)
                         yield self._envelope.payload.name, what, self._joined(cells)
-            case Coded(stages=()) | Plain() | SevenBit():
-                pass
+            case Coded(stages=()) | Plain() | SevenBit() | PayloadStuffing():
+                pass  # every byte of a payload to which a number is added is right
             case Coded():
                 yield from self._miscoded(self._transparency)
             case _:

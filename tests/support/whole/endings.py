@@ -33,7 +33,11 @@ def openly(rng: random.Random, frame: Doc) -> None:
         *({"digits": "hex"}, {"pair": "complement"}, {"add": _hex(rng.randrange(256))}),
     ]
     coding = rng.choice(kinds)
-    if rng.random() < 0.4:
+    specs = list(frame["parts"].values())
+    counted = any("counts" in spec for spec in specs) and any("over" in spec for spec in specs)
+    if counted and rng.random() < 0.3:
+        coding = {"add": _hex(rng.randrange(1, 256)), "checked": "after"}
+    elif rng.random() < 0.4:
         payload = next(at for at, name in enumerate(names) if frame["parts"][name].get("role") == "payload")
         first, last = rng.randint(0, payload), rng.randint(payload, len(names) - 1)
         coding = {**coding, "over": names[first : last + 1]}

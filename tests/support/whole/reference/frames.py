@@ -211,6 +211,8 @@ class Frame:
         self.least, self.most = whole_span(self.by_role["payload"].spec["size"])
         self.overhead = sum(part.size for part in self.parts)
         self.stuffing = _stuffing(frame.get("stuffing"))
+        #: Added to each byte of a payload, before lengths and check values are computed.
+        self.plus = int(frame.get("plus", 0))
         length = self.by_role.get("length")
         counted = length.spec["counts"] if length else []
         counted = [counted] if isinstance(counted, str) else counted
@@ -371,6 +373,7 @@ class Frame:
         """A frame around a payload, which is not checked; `given` are values of the frame."""
         if self.stuffing and self.stuffing.payload_alone:
             payload = self.stuffing.stuff(payload)
+        payload = bytes((byte + self.plus) % 256 for byte in payload)
         cut: dict[str, bytes] = {}
         rest = self._id_pieces(number)
         for part in self.parts:

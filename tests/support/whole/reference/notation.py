@@ -90,6 +90,9 @@ def load(text: str) -> Doc:
 def _stuffed(frame: Doc, parts: Doc) -> None:
     """Write the insertion into a frame that is read from left to right as stuffing."""
     coding = frame.get("coding")
+    if isinstance(coding, dict) and "add" in coding and coding.get("checked") == "after":
+        frame["plus"] = octets(frame.pop("coding")["add"])[0]
+        return
     ended = any(isinstance(spec, dict) and spec.get("role") == "terminator" for spec in parts.values())
     if not isinstance(coding, dict) or "insert" not in coding or ended or frame.get("silent"):
         return

@@ -273,6 +273,7 @@ class Searcher(Receiver):
     def _plain(self, cut: Cut) -> bytes:
         """Decode the payload. Raises Refused."""
         payload, stuffing = cut.parts[self.frame.by_role["payload"].name], self.frame.stuffing
+        payload = bytes((byte - self.frame.plus) % 256 for byte in payload)
         if stuffing is None or not stuffing.payload_alone:
             return payload
         try:
