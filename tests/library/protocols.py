@@ -35,6 +35,7 @@ PEERS: Mapping[str, tuple[str, str]] = {
     "cobs": ("cobs", "cobs"),
     "crsf": ("crsf_parser", "crsf-parser"),
     "dnp3": ("dnp3", "dnp3py"),
+    "dynamixel_1": ("dynamixel_sdk", "dynamixel-sdk"),
     "dynamixel_2": ("dynamixel_sdk", "dynamixel-sdk"),
     "mavlink_1": ("pymavlink", "pymavlink"),
     "mavlink_2": ("pymavlink", "pymavlink"),

@@ -84,6 +84,37 @@ def test_dynamixel_sdk_reads_and_writes_a_servo() -> None:
             port.closePort()
 
 
+def test_dynamixel_sdk_reads_and_writes_an_older_servo() -> None:
+    peer("dynamixel_1")
+    from dynamixel_sdk import COMM_SUCCESS, PortHandler, Protocol1PacketHandler
+
+    codec: Any = described("dynamixel_1").module
+    table = bytearray(range(50))
+
+    def servo(request: Any) -> Any:
+        match request:
+            case codec.PingRequest():
+                return codec.PingResponse(node=3)
+            case codec.ReadRequest(start=start, size=size) if start + size <= len(table):
+                return codec.ReadResponse(node=3, data=bytes(table[start : start + size]))
+            case codec.WriteRequest(start=start, data=data):
+                table[start : start + len(data)] = data
+                return codec.WriteResponse(node=3)
+        return codec.Range(node=3)
+
+    with serving("dynamixel_1", 3, servo) as pty:
+        port, packets = PortHandler(pty.path), Protocol1PacketHandler()
+        assert port.openPort()
+        port.setPacketTimeout = lambda _: port.setPacketTimeoutMillis(1000 * PATIENCE)
+        try:
+            assert packets.ping(port, 3) == (0x0100, COMM_SUCCESS, 0)
+            assert packets.write2ByteTxRx(port, 3, 30, 0x1234) == (COMM_SUCCESS, 0)
+            assert packets.read2ByteTxRx(port, 3, 30) == (0x1234, COMM_SUCCESS, 0)
+            assert packets.read1ByteTxRx(port, 3, 200)[1:] == (COMM_SUCCESS, 8)
+        finally:
+            port.closePort()
+
+
 def test_dynamixel_sdk_reads_several_servos_at_once() -> None:
     peer("dynamixel_2")
     from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PortHandler, Protocol2PacketHandler
