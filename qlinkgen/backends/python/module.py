@@ -234,7 +234,7 @@ class Module:
         typing |= {"Any"} if "ChoiceRule" in used else set()
         check = None if isinstance(view, PacketView) else view.check
         if check is not None:
-            used |= {"Checksum", "wrong_check", check.maker}
+            used |= {"Checksum", check.maker, *(["wrong_check"] if _has_late_check(views) else [])}
             used |= {"find_crc"} if check.selectable else set()
         used |= {check.view.maker for each in views if isinstance(each, PartsView) for check in each.checks}
         match view:
@@ -335,3 +335,9 @@ def _placed(template: str, module: ModuleView, **parts: str) -> str:
 def _has_digits(plan: Plan) -> bool:
     coded = plan.frame.transparency
     return isinstance(coded, Coded) and any(isinstance(stage, Digits) for stage in coded.stages)
+
+
+def _has_late_check(views: Sequence[AnyView]) -> bool:
+    """Whether a check value is compared with the whole frame, not before its payload is there."""
+    parts = [each for each in views if isinstance(each, PartsView)]
+    return not parts or any(not check.early for each in parts for check in each.checks)
