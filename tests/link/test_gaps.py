@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from qlinkgen.backends import python
+from qlinkgen.backends import c, python
+from qlinkgen.backends.base import Options
 from qlinkgen.link import MasterEngine, SlaveEngine, Timing
 from qlinkgen.link.events import Damaged
 from qlinkgen.link.monitor import Asked, Monitor, Replied
@@ -140,3 +141,11 @@ def test_a_monitor_divides_frames_by_their_times() -> None:
     monitor.receive(b"\1\2\3", 2.0)
     monitor.finish(2.1)
     assert [type(each) for each in monitor.heard] == [Asked, Replied, Damaged]
+
+
+def test_the_example_in_c_handles_frames_when_the_line_is_idle() -> None:
+    protocol, _ = loads(_SCHEMA, "gauge.yaml")
+    assert protocol is not None
+    header = c.generate(protocol, Options())["c/gauge.h"]
+    assert "(void)gauge_receive(&receiver, byte);" in header
+    assert "if (gauge_rx_idle(&receiver) == GAUGE_EVENT_FRAME) {" in header

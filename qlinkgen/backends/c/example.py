@@ -152,13 +152,10 @@ def _numbers(message: MessagePlan) -> list[str]:
 
 
 def _receive(prefix: str, section: FrameSection, declared: list[str], *handled: str) -> list[str]:
-    """A function that processes a received byte, for an interrupt or a loop."""
+    """A function that processes a received byte, for an interrupt or a loop; and one for a silence."""
     upper, rescans = prefix.upper(), section.rescans
-    test = (
-        "while (event != {P}_EVENT_NONE) {{"
-        if rescans
-        else "if ({p}_receive(&receiver, byte) == {P}_EVENT_FRAME) {{"
-    )
+    call = "{p}_rx_idle(&receiver)" if section.gaps else "{p}_receive(&receiver, byte)"
+    test = "while (event != {P}_EVENT_NONE) {{" if rescans else f"if ({call} == {{P}}_EVENT_FRAME) {{{{"
     body = ["const {p}_frame_t frame = {p}_receiver_frame(&receiver);", *handled]
     if rescans:
         body = [
@@ -170,6 +167,9 @@ def _receive(prefix: str, section: FrameSection, declared: list[str], *handled: 
     first = ["{p}_event_t event = {p}_receive(&receiver, byte);"] if rescans else []
     inside = [*declared, *first, test, *(f"    {line}" for line in body), "}}"]
     lines = ["void board_received(uint8_t byte)", "{{", *(f"    {line}" for line in inside), "}}"]
+    if section.gaps:
+        taken = ["    (void){p}_receive(&receiver, byte);", "}}", "", "void board_idle(void)", "{{"]
+        lines = [*lines[:2], *taken, *lines[2:]]
     return [
         line.replace("{p}", prefix).replace("{P}", upper).replace("{{", "{").replace("}}", "}")
         for line in lines
