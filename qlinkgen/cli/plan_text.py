@@ -124,8 +124,9 @@ def show_message_plan(plan: Plan, message: MessagePlan) -> None:
         heading("Sizes, in this order")
         paragraph([*sizes, f"{len(sizes) + 1}. the payload has {size_text(payload.size)} bytes"])
     if payload.separator:
-        least, most = needed(payload), len(payload.steps)
-        texts = f"{span_text(least, most)} texts, divided by {payload.separator.decode()!r}"
+        least, most = needed(payload) - payload.leading, len(payload.steps)
+        place = "after" if payload.leading else "divided by"
+        texts = f"{span_text(least, most)} texts, {place} {payload.separator.decode()!r}"
         heading("Texts")
         paragraph([texts, "an absent field is empty; at the end it is left out"] if least < most else [texts])
     elif payload.walked:

@@ -241,11 +241,12 @@ def greatest_size(fields: Iterable[Field]) -> int:
     return size
 
 
-def separated_size(fields: Sequence[Field]) -> tuple[int, int]:
-    """The minimum and maximum size of fields with separators between them."""
+def separated_size(fields: Sequence[Field], *, leading: bool) -> tuple[int, int]:
+    """The minimum and maximum size of fields with separators between them, or before each of them."""
+    without = int(not leading)
     needed = max((index for index, each in enumerate(fields, 1) if not each.optional), default=0)
-    least = sum(each.min_size for each in fields[:needed]) + max(0, needed - 1)
-    return least, sum(each.max_size for each in fields) + len(fields) - 1
+    least = sum(each.min_size for each in fields[:needed]) + max(0, needed - without)
+    return least, sum(each.max_size for each in fields) + len(fields) - without
 
 
 def values_of(fields: Iterable[Field]) -> Iterator[Value]:

@@ -60,6 +60,8 @@ class Message:
     carries: bool = False
     #: The byte between fields, which are texts; b"" if there is none.
     separator: bytes = b""
+    #: It precedes the first field too.
+    leading: bool = False
     #: What the frame allows, where all records together may be larger than that; None for others.
     limit: int | None = None
 
@@ -67,13 +69,15 @@ class Message:
     def min_size(self) -> int:
         """Minimum size of the payload, without regard to ``empty_is_default``."""
         if self.separator:
-            return separated_size(self.fields)[0]
+            return separated_size(self.fields, leading=self.leading)[0]
         return sum(field.min_size for field in self.fields)
 
     @cached_property
     def max_size(self) -> int:
         """Maximum size of the payload."""
-        size = separated_size(self.fields)[1] if self.separator else greatest_size(self.fields)
+        size = greatest_size(self.fields)
+        if self.separator:
+            size = separated_size(self.fields, leading=self.leading)[1]
         return size if self.limit is None else min(size, self.limit)
 
     @property

@@ -506,6 +506,7 @@ class PayloadPlan:
             ``size`` are then empty.
         separator: the byte between the fields, each of which is a text; b"" if there is none. ``sizing``,
             ``size`` and places mean nothing then.
+        leading: the separator precedes the first field too, so an empty text comes before it.
         trim: bytes that are sent at least where zeros at the end are not; None if all are sent. ``least``
             is then the minimum size without them.
     """
@@ -518,6 +519,7 @@ class PayloadPlan:
     empty_is_default: bool
     segments: tuple[Segment, ...] = ()
     separator: bytes = b""
+    leading: bool = False
     trim: int | None = None
 
     def trimmed(self, payload: bytes) -> bytes:

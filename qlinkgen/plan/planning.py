@@ -107,6 +107,7 @@ class _Planner:
             most=message.max_size,
             empty_is_default=False,
             separator=message.separator,
+            leading=message.leading,
         )
 
     def walked(self) -> PayloadPlan:

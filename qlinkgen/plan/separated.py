@@ -23,7 +23,14 @@ def text_steps(plan: PayloadPlan) -> tuple[TextStep, ...]:
 
 def needed(plan: PayloadPlan) -> int:
     """Minimum number of texts, at least 1: those up to the last one that cannot be absent."""
-    return max((index for index, step in enumerate(plan.steps, 1) if step.presence is None), default=1)
+    before = int(plan.leading)
+    places = (index for index, step in enumerate(plan.steps, 1 + before) if step.presence is None)
+    return max(places, default=1)
+
+
+def most_texts(plan: PayloadPlan) -> int:
+    """Maximum number of texts, the empty one before a leading separator included."""
+    return len(plan.steps) + plan.leading
 
 
 def characters(step: TextStep) -> tuple[int, int]:
@@ -37,6 +44,7 @@ def characters(step: TextStep) -> tuple[int, int]:
 
 def joined(plan: PayloadPlan, texts: list[bytes]) -> bytes:
     """The payload of the texts of all fields."""
+    texts = [b"", *texts] if plan.leading else texts
     while len(texts) > needed(plan) and not texts[-1]:
         texts.pop()
     return plan.separator.join(texts)
@@ -48,8 +56,10 @@ def visit(plan: PayloadPlan, payload: bytes) -> Iterator[Visit]:
         yield from walk.visit(plan, payload)
         return
     texts, steps, at = payload.split(plan.separator), text_steps(plan), 0
-    if not needed(plan) <= len(texts) <= len(steps):
+    if not needed(plan) <= len(texts) <= most_texts(plan) or (plan.leading and texts[0]):
         raise Wrong("", 0)
+    if plan.leading:
+        texts, at = texts[1:], min(1, len(payload))
     for index, step in enumerate(steps):
         text = texts[index] if index < len(texts) else b""
         if step.presence is not None and not text:

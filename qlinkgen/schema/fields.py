@@ -15,11 +15,13 @@ from qlinkgen.schema.file_fields import Fields, FieldSpec, RecordSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.filled import FilledBuilder
 from qlinkgen.schema.location import Location
-from qlinkgen.schema.notation import shown, type_text
+from qlinkgen.schema.notation import Divider, shown, type_text
 from qlinkgen.schema.records import RecordBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.types import TypeBuilder
+
+_UNDIVIDED = Divider()
 
 
 class FieldBuilder:
@@ -38,12 +40,13 @@ class FieldBuilder:
         self._records.check()
 
     def build(
-        self, specs: Fields, path: Path, asked: Collection[str] = (), *, separated: bool = False
+        self, specs: Fields, path: Path, asked: Collection[str] = (), *, divider: Divider = _UNDIVIDED
     ) -> tuple[Field, ...]:
         """The fields of one message, without those that cannot be built.
 
-        ``asked`` are those with a number of items from the request; ``separated``: texts between separators.
+        ``asked`` are those with a number of items from the request; ``divider`` is the separator of texts.
         """
+        separated = bool(divider.byte)
         specs = with_counts(specs, path, self._report)
         fields: list[Field] = []
         for name, spec in specs.items():
@@ -61,7 +64,9 @@ class FieldBuilder:
         fields = FilledBuilder(specs, path, self._report).build(fields)
         if not separated:
             self._check_open_ends(fields, path)
-        return tuple(self._bounded(fields, path, separators=len(fields) - 1 if separated else 0))
+        return tuple(
+            self._bounded(fields, path, separators=len(fields) - (not divider.before) if separated else 0)
+        )
 
     def _check_text(self, kind: FieldType, path: Path) -> None:
         """Check that a receiver finds the end of a number as text."""

@@ -122,12 +122,14 @@ WholeRange = Annotated[
 ]
 
 
-def _separator(value: object) -> bytes:
-    """The byte of a separator; b"" for none."""
+def _separator(value: object) -> notation.Divider:
+    """A separator between fields, or before each of them."""
     if value == "none":
-        return b""
-    if isinstance(value, str) and len(value) == 1 and value.isascii():
-        return value.encode()
+        return notation.Divider()
+    before = isinstance(value, dict) and value.keys() == {"before"}
+    text = value["before"] if isinstance(value, dict) and before else value
+    if isinstance(text, str) and len(text) == 1 and text.isascii():
+        return notation.Divider(text.encode(), before)
     raise ValueError(f"{shown(value)} is not one character; write one like ',' or none")
 
 
@@ -143,9 +145,11 @@ Characters = Annotated[
     str, BeforeValidator(_characters), WithJsonSchema({"type": "string", "pattern": "^[ -~]+$"})
 ]
 Separator = Annotated[
-    bytes,
+    notation.Divider,
     PlainValidator(_separator),
-    _json("One character between fields, like ','; or none", "string"),
+    _json(
+        "One character between fields, like ','; {before: ','}: before each field; none", "string", "object"
+    ),
 ]
 AnyCondition = Annotated[
     tuple[notation.TestText, ...],

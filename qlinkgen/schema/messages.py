@@ -17,7 +17,7 @@ from qlinkgen.schema.file_base import Fact
 from qlinkgen.schema.file_commands import CommandSpec, MessageSpec
 from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.file_model import SchemaFile
-from qlinkgen.schema.notation import StatedId
+from qlinkgen.schema.notation import Divider, StatedId
 from qlinkgen.schema.pieces import IdBuilder
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.seeds import SeedBuilder
@@ -50,7 +50,7 @@ class Written(NamedTuple):
     fields: Fields
     path: Path
     asked: Collection[str] = ()
-    separator: bytes | None = None
+    separator: Divider | None = None
     way: str = ""
     kind: str | None = None
     inherited: bool = False
@@ -121,7 +121,8 @@ class MessageBuilder:
             addresses=ranges,
             default_address=default,
             seeds=self._seeds.of_command(name, number),
-            separator=self._separator(layout),
+            separator=self._separator(layout).byte,
+            leading=self._separator(layout).before,
         )
         return self._added(message, layout)
 
@@ -158,22 +159,24 @@ class MessageBuilder:
             addresses=ranges,
             default_address=default,
             seeds=self._seeds.of_command(command, number),
-            separator=self._separator(layout),
+            separator=self._separator(layout).byte,
+            leading=self._separator(layout).before,
         )
         return self._added(message, layout)
 
-    def _separator(self, layout: Written) -> bytes:
-        """The separator of a message, which may be that of the defaults; b"" without fields."""
-        usual = self._file.defaults.separator or b""
-        return (usual if layout.separator is None else layout.separator) if layout.fields else b""
+    def _separator(self, layout: Written) -> Divider:
+        """The separator of a message, which may be that of the defaults; none without fields."""
+        usual = self._file.defaults.separator or Divider()
+        return (usual if layout.separator is None else layout.separator) if layout.fields else Divider()
 
     def _fields_of(self, layout: Written) -> tuple[Field, ...]:
         fields = self._fields.build(
             layout.fields,
             layout.path,
             layout.asked,
-            separated=bool(separator := self._separator(layout)),
+            divider=self._separator(layout),
         )
+        separator = self._separator(layout).byte
         if not separator:
             return fields
         for name in layout.asked:
@@ -223,7 +226,8 @@ class MessageBuilder:
             addresses=(nodes,) if nodes else (),
             default_address=nodes[0] if nodes else 0,
             seeds=self._seeds.of(name, number, spec.attributes, ("messages", name)),
-            separator=self._separator(layout),
+            separator=self._separator(layout).byte,
+            leading=self._separator(layout).before,
         )
         message = self._added(message, layout)
         if isinstance(self._frame, PacketFrame) and direction != "request":

@@ -43,6 +43,14 @@ class Range:
 
 
 @dataclass(frozen=True, slots=True)
+class Divider:
+    """The byte of a separator, b"" for none; it may precede each field, the first one included."""
+
+    byte: bytes = b""
+    before: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Duration:
     """Byte times or seconds, one of them zero."""
 

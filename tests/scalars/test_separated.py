@@ -52,6 +52,23 @@ def loaded(fields: str = FIELDS, more: str = "{}") -> tuple[Protocol | None, lis
     return loads(text, "probe.yaml")
 
 
+def test_a_separator_precedes_each_field() -> None:
+    fields = '      {depth: {type: u8, as: decimal}, note: {type: "text[1..5]", optional: true}}'
+    text = _SCHEMA.format(fields=fields, more='separator: {before: ","}').replace(
+        '    comma: {text: ","}\n', ""
+    )
+    found, faults = loads(text + '  ask: {id: ASK, separator: {before: ","}, fields: {}}\n', "probe.yaml")
+    assert found, [str(fault) for fault in faults]
+    module, live = python.load(found), construct.live(found)
+    assert module.Ask().to_frame() == b"$ASK\r\n"
+    for values, wire in (({"depth": 7}, b"$PUT,7\r\n"), ({"depth": 7, "note": "a"}, b"$PUT,7,a\r\n")):
+        assert module.Put(**values).to_frame() == wire
+        assert live.payload("put", values) == wire[4:-2]
+        assert module.decode(wire) == module.Put(**values)
+    with pytest.raises(module.DecodeError, match="data bytes"):
+        module.decode(b"$PUT7\r\n")
+
+
 @pytest.fixture(scope="module")
 def protocol() -> Protocol:
     found, faults = loaded()

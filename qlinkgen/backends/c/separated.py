@@ -16,14 +16,14 @@ from qlinkgen.model.digits import Digits
 from qlinkgen.model.integer import Integer
 from qlinkgen.plan.expr import Within
 from qlinkgen.plan.payload import BytesStep, ConstantStep, PayloadPlan, ReservedStep, ValueStep
-from qlinkgen.plan.separated import TextStep, characters, needed, text_steps
+from qlinkgen.plan.separated import TextStep, characters, most_texts, needed, text_steps
 
 
 def size_lines(payload: PayloadPlan, layouts: Layouts) -> list[str]:
     """Body of the function that returns the size of the payload of a struct."""
     least = needed(payload)
     lines = [f"size_t size = {least - 1}U;"]
-    for index, step in enumerate(text_steps(payload)):
+    for index, step in enumerate(text_steps(payload), int(payload.leading)):
         own = [f"size += {_size(step, layouts)};"]
         if index >= least:
             # The separators before it, of which those before the last field needed are counted.
@@ -31,7 +31,7 @@ def size_lines(payload: PayloadPlan, layouts: Layouts) -> list[str]:
         lines += _guarded(step, own)
     if not any("message->" in line for line in lines):
         lines.append("(void)message;")
-    if least == len(payload.steps):
+    if least == most_texts(payload):
         return [*lines, "return size;"]
     return [lines[0], "size_t after = 0U;", *lines[1:], "return size + after;"]
 
@@ -39,7 +39,7 @@ def size_lines(payload: PayloadPlan, layouts: Layouts) -> list[str]:
 def constant_size(payload: PayloadPlan) -> int:
     """The size of a payload without values."""
     steps = [step for step in payload.steps if isinstance(step, ConstantStep | ReservedStep)]
-    return sum(len(step.integer.pack(step.value)) for step in steps) + len(steps) - 1
+    return sum(len(step.integer.pack(step.value)) for step in steps) + most_texts(payload) - 1
 
 
 def _size(step: TextStep, layouts: Layouts) -> str:
@@ -92,14 +92,18 @@ class SeparatedEncoder(Encoder):
         size = (
             f"{self.function}_size_(message)" if self.payload.settable else f"{constant_size(self.payload)}U"
         )
-        lines += [f"const size_t size = {size};", *(["size_t left = size;"] if len(steps) > 1 else []), ""]
+        lines += [
+            f"const size_t size = {size};",
+            *(["size_t left = size;"] if most_texts(self.payload) > 1 else []),
+            "",
+        ]
         for step in steps:
             self._check_text(step)
             lines += _guarded(step, self._flushed())
         self._refuse(["capacity < size"], "CAPACITY")
         lines += self._flushed()
         for index, step in enumerate(steps):
-            if index:
+            if index or self.payload.leading:
                 onward = ["++payload;", *(["--left;"] if step is not steps[-1] else [])]
                 put = [f"payload[0] = {separator};", *onward]
                 lines += ["if (left > 0U) {", *(f"    {line}" for line in put), "}"]
@@ -169,10 +173,12 @@ class SeparatedDecoder(Decoder):
         prefix = self.layouts.cells()
         lines += [f"const size_t texts = {prefix}_texts_(payload, size, {separator});", "size_t length = 0U;"]
         lines += ["*message = defaults;"] if plan.settable else []
-        least, most = needed(plan), len(steps)
+        least, most = needed(plan), most_texts(plan)
         wrong = [f"texts != {most}U"] if least == most else [f"texts < {least}U", f"texts > {most}U"]
         self.refuse(wrong if least > 1 or least == most else wrong[1:], "LENGTH")
         lines += self._flushed()
+        if plan.leading:
+            lines += self._led(separator)
         for step in steps:
             lines.append(f"length = {prefix}_text_size_(payload, size, {separator});")
             self._text(step)
@@ -192,6 +198,13 @@ class SeparatedDecoder(Decoder):
                 ]
         self.reads = True
         return lines
+
+    def _led(self, separator: str) -> list[str]:
+        """Statements that pass the separator before the first text."""
+        upper = self.layouts.prefix.upper()
+        refused = checks.refusal([f"payload[0] != {separator}"], f"{upper}_ERROR_LENGTH")
+        inner = [*refused, "++payload;", "--size;"]
+        return ["if (size > 0U) {", *(f"    {line}" for line in inner), "}"]
 
     def _flushed(self) -> list[str]:
         lines, self.lines = self.lines, []

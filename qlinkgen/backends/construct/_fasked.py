@@ -82,6 +82,8 @@ class Told(Construct):
                 fields = message.parse(data)
             except RangeError as error:
                 faults.append(FrameError("length", f"{message.name}; {error}"))
+            except FrameError as error:
+                faults.append(error)
             except ConstructError as error:
                 faults.append(FrameError("range", f"{message.name}; {error}"))
             else:

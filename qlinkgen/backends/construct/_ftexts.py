@@ -120,7 +120,7 @@ class BetweenField(TextField):
 
 
 class Separated(Message):
-    """A message of texts between separators.
+    """A message of texts between separators, or with a ``leading`` one before each.
 
     Those of ``optional``, names and whether they are sent by default, may be absent: empty, or None.
     """
@@ -131,12 +131,14 @@ class Separated(Message):
         message_id: int,
         *fields: Renamed,
         separator: bytes,
+        leading: bool = False,
         optional: Sequence[tuple[str, bool]] = (),
         **settings: Any,
     ) -> None:
         # Any: the settings of a Message.
         super().__init__(name, message_id, *fields, **settings)
         self.separator = separator
+        self.leading = leading
         self.optional = {field for field, _ in optional}
         self.defaults.update({field: None for field, given in optional if not given})
         needed = [
@@ -149,11 +151,16 @@ class Separated(Message):
         least = sum(
             0 if none else low for none, (low, _) in zip(absent, kept, strict=False)
         )
-        self.least = least + self.needed - 1
-        self.most = sum(high for _, high in sizes) + len(sizes) - 1
+        if leading and not needed:
+            self.needed = 0
+        between = 0 if leading else 1
+        self.least = least + max(0, self.needed - between)
+        self.most = sum(high for _, high in sizes) + len(sizes) - between
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
         texts = stream_read_entire(stream, path).split(self.separator)
+        if self.leading and texts.pop(0):
+            raise RangeError(f"no separator begins {self.name}", path=path)
         if not self.needed <= len(texts) <= len(self.fields):
             raise RangeError(f"{len(texts)} texts in {self.name}", path=path)
         texts += [b""] * (len(self.fields) - len(texts))
@@ -184,7 +191,7 @@ class Separated(Message):
         texts = [self._text(field, values, path) for field in self.fields]
         while len(texts) > self.needed and not texts[-1]:
             texts.pop()
-        data = self.separator.join(texts)
+        data = self.separator.join([b""] * self.leading + texts)
         stream_write(stream, data, len(data), path)
         return obj
 

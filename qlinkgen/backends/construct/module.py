@@ -109,9 +109,7 @@ def _message(message: MessagePlan, types: Types) -> Call:
     if message.message.seeds:
         settings["seeds"] = message.message.seeds
     if message.payload.separator:
-        settings["separator"] = message.payload.separator
-        if optional := tuple((each.field, each.given) for each in _absent(message.payload)):
-            settings["optional"] = Sequence(optional)
+        settings |= _dividing(message.payload)
     elif message.payload.walked:
         settings |= _walking(message.payload)
     name = _class_of(message.payload)
@@ -120,6 +118,16 @@ def _message(message: MessagePlan, types: Types) -> Call:
     return Call(
         name, (message.name, hexadecimal(message.id), *fields(message, types)), tuple(settings.items())
     )
+
+
+def _dividing(payload: PayloadPlan) -> dict[str, Node]:
+    """The settings of a payload of texts with a separator."""
+    settings: dict[str, Node] = {"separator": payload.separator}
+    if payload.leading:
+        settings["leading"] = True
+    if optional := tuple((each.field, each.given) for each in _absent(payload)):
+        settings["optional"] = Sequence(optional)
+    return settings
 
 
 def _walking(payload: PayloadPlan) -> dict[str, Node]:

@@ -14,7 +14,7 @@ from qlinkgen.model.digits import Digits
 from qlinkgen.model.integer import Integer
 from qlinkgen.plan.expr import Size, Within
 from qlinkgen.plan.payload import BytesStep, ConstantStep, ReservedStep, ValueStep
-from qlinkgen.plan.separated import TextStep, characters, needed, text_steps
+from qlinkgen.plan.separated import TextStep, characters, most_texts, needed, text_steps
 
 
 @dataclass
@@ -27,7 +27,7 @@ class SeparatedEncoder(WalkedEncoder):
         payload, lines = self.message.payload, list[str]()
         for step in text_steps(payload):
             lines += self._text(step)
-        texts = [f"{step.name}_text" for step in payload.steps]
+        texts = [*(['b""'] if payload.leading else []), *(f"{step.name}_text" for step in payload.steps)]
         separator, least = literal(payload.separator), needed(payload)
         if len(texts) == 1 == least:
             return [*lines, f"data = {texts[0]}", *self._framed(name)]
@@ -84,14 +84,15 @@ class SeparatedDecoder(WalkedDecoder):
         lines.append(
             f"texts = {f'bytes({data})' if place.unique else data}.split({literal(payload.separator)})"
         )
-        most = len(steps)
+        most = most_texts(payload)
         wrong = integers.broken(Within(least, most), "len(texts)")
+        wrong += " or texts[0]" if payload.leading else ""
         lines += [f"if {wrong}:", self._bad_layout]
         if least < most:
             lines.append(f'texts += [b""] * ({most} - len(texts))')
         names = [f"{step.name}_text" for step in steps]
-        lines += assigned_targets(names, "texts")
-        for index, step in enumerate(steps):
+        lines += assigned_targets(names, "texts[1:]" if payload.leading else "texts")
+        for index, step in enumerate(steps, int(payload.leading)):
             lines += self._text(step, f"{place.use('start_of')}(texts, {index})" if index else "0")
         at, behind = Size(), self._needed_back()
         if behind:

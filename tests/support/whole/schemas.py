@@ -260,7 +260,7 @@ class _Maker:
             addressing = command["addressing"] = rng.choice(most)
         silent = addressing == "broadcast" or (addressing != "answered_broadcast" and rng.random() < 0.2)
         if self._separable(shape) and rng.random() < 0.15:
-            command["separator"] = rng.choice((",", ";", " ", "\t"))
+            command["separator"] = rng.choice((",", ";", " ", "\t", {"before": ","}, {"before": ";"}))
             request = maker.texts(Room.of(shape))
             response = "none" if silent else maker.texts(Room.of(shape))
         else:
@@ -512,7 +512,8 @@ class _Maker:
         if direction and kinds != "undirected":
             message["direction"] = direction
         if self._separable(shape) and self.rng.random() < 0.3:
-            return self._described(message | {"separator": ",", "fields": maker.texts(Room.of(shape))})
+            separator = self.rng.choice((",", {"before": ","}))
+            return self._described(message | {"separator": separator, "fields": maker.texts(Room.of(shape))})
         return self._described(message | {"fields": maker.fields(Room.of(shape))})
 
     def _separable(self, shape: Shape) -> bool:

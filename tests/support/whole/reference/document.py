@@ -65,12 +65,14 @@ def with_separator(message: Message, document: Doc) -> Message:
     chosen = spec.get("separator", usual)
     if chosen in (None, "none") or not message.slots:
         return message
+    leading = isinstance(chosen, dict)
+    chosen = chosen["before"] if isinstance(chosen, dict) else chosen
     ends = [each for each in document["frame"]["parts"].values() if isinstance(each, dict)]
     ends = [each for each in ends if each.get("role") == "terminator"]
     end = b"".join(each["text"].encode() if "text" in each else octets(each["value"]) for each in ends)
     barred = chosen.encode() + end
     slots = tuple(_filled(slot, barred) for slot in message.slots)
-    return replace(message, slots=slots, separator=chosen.encode(), barred=barred)
+    return replace(message, slots=slots, separator=chosen.encode(), leading=leading, barred=barred)
 
 
 def _filled(slot: Slot, barred: bytes) -> Slot:

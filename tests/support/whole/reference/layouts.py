@@ -326,6 +326,8 @@ class Message:
     trim: int | None = None
     #: The byte between texts, and the bytes that a text does not have.
     separator: bytes = b""
+    #: It precedes the first text too.
+    leading: bool = False
     barred: bytes = b""
     #: Kinds of frame that carry it, if there are several.
     frames: tuple[str, ...] = ()

@@ -102,15 +102,18 @@ def _texts(message: Message, values: Mapping[str, Raw]) -> bytes:
             if isinstance(slot.kind, Run) and any(each in message.barred for each in text):
                 raise Wrong("range", slot.name)
         if seen:
-            data = (message.separator if index else b"") + text + data
+            data = (message.separator if index or message.leading else b"") + text + data
     return data
 
 
 def _between(message: Message, payload: bytes) -> dict[str, Raw]:
     """The values of texts between separators."""
     texts = payload.split(message.separator)
+    if message.leading and texts.pop(0):
+        raise Wrong("length", "no separator at the beginning")
     needed = [index for index, slot in enumerate(message.slots) if not slot.optional]
-    if not max(needed, default=0) < len(texts) <= len(message.slots):
+    least = max(needed, default=-1 if message.leading else 0) + 1
+    if not least <= len(texts) <= len(message.slots):
         raise Wrong("length", f"{len(texts)} texts")
     values: dict[str, Raw] = {}
     for index, slot in enumerate(message.slots):
