@@ -70,7 +70,11 @@ def _named(document: Doc) -> None:
             if given and "'role'" in str(given.get("bits")):
                 own = {key: each for key, each in spec.items() if key != "type"} if spec != kind else {}
                 parts[name] = {**given, **own}
-    document["types"] = {name: each for name, each in types.items() if "'role'" not in str(each.get("bits"))}
+    document["types"] = {
+        name: each
+        for name, each in types.items()
+        if not (isinstance(each, dict) and "'role'" in str(each.get("bits")))
+    }
 
 
 def load(text: str) -> Doc:
