@@ -79,11 +79,12 @@ def _frame(plan: Plan) -> None:
 
 
 def _bus(protocol: Protocol) -> None:
-    bus = protocol.bus
+    bus, master = protocol.bus, protocol.master
     facts = [
         bus.kind.replace("_", "/"),
         f"{protocol.address_name or 'nodes'} {span_text(*bus.nodes)}" if bus.nodes else "",
         "" if bus.broadcast is None else f"broadcast {bus.broadcast}",
+        f"master {master.type.default}" if master and master.type else "",
         f"{bus.baud} baud, {bus.bits_per_byte} bits per byte" if bus.baud else "",
     ]
     answer = describe.time_text(bus.response_within)
