@@ -14,7 +14,7 @@ import pytest
 
 from qlinkgen.backends.python import load as load_codec
 from qlinkgen.errors import LinkError
-from qlinkgen.link import Monitor, PeerEngine, Timing
+from qlinkgen.link import Dialogue, Monitor, PeerEngine, Timing
 from qlinkgen.link.monitor import Asked, Replied
 from qlinkgen.schema import loads
 from qlinkgen.transport import memory_pair
@@ -44,7 +44,16 @@ commands:
     from: device
     request: {block: u8}
     response: {block: {type: u8, echo: true}, data: "u8[1..4]"}
+  store:
+    id: 5
+    request: {number: u8}
+    steps:
+      - {receive: ack}
+      - {name: place, send: {id: 0x31, fields: {start: u16}}, within: 50 ms}
+      - {receive: ack}
+      - {name: done, receive: {id: 0x33, fields: {number: {type: u8, echo: true}, start: u16}}}
 messages:
+  ack: {id: 0x79, from: device, fields: {}}
   event: {id: 0x40, from: device, fields: {kind: u8}}
 """
 BYTE = 10 / 115200
@@ -71,7 +80,11 @@ class Side:
             return self.codec.PingResponse(number=request.number, twice=(2 * request.number) & 0xFFFFFFFF)
         if isinstance(request, self.codec.FetchRequest):
             return self.codec.FetchResponse(block=request.block, data=[request.block] * 3)
-        return None
+        return self.store(request) if isinstance(request, self.codec.StoreRequest) else None
+
+    def store(self, request: Any) -> Any:
+        place = yield self.codec.Ack()
+        return [self.codec.Ack(), self.codec.StoreDone(number=request.number, start=place.start)]
 
 
 @dataclass
@@ -131,7 +144,11 @@ def run(line: Line, requests: tuple[list[Any], list[Any]]) -> tuple[list[Any], l
 
 def requests(codec: Any, count: int, seed: int) -> tuple[list[Any], list[Any]]:
     chance = random.Random(seed)
-    host = [codec.PingRequest(number=chance.getrandbits(32)) for _ in range(count)]
+    host: list[Any] = [codec.PingRequest(number=chance.getrandbits(32)) for _ in range(count)]
+    host[::3] = [
+        Dialogue(codec.StoreRequest(number=number % 256), [codec.StorePlace(start=chance.getrandbits(16))])
+        for number in range(0, count, 3)
+    ]
     device = [
         codec.FetchRequest(block=chance.getrandbits(8))
         if chance.random() < 0.5
@@ -143,6 +160,11 @@ def requests(codec: Any, count: int, seed: int) -> tuple[list[Any], list[Any]]:
 
 def right(codec: Any, request: Any, answer: Any) -> bool:
     """Whether an answer is that to a request."""
+    if isinstance(request, Dialogue):
+        begun: Any = request.request
+        place: Any = request.further[0]
+        last = codec.StoreDone(number=begun.number, start=place.start)
+        return bool(answer[-1] == last)
     if isinstance(request, codec.FetchRequest):
         return bool(answer == codec.FetchResponse(block=request.block, data=[request.block] * 3))
     return bool(answer == codec.PingResponse(number=request.number, twice=(2 * request.number) & 0xFFFFFFFF))
@@ -178,7 +200,7 @@ def test_no_answer_is_wrong_under_faults(both: ModuleType) -> None:
         assert all(
             isinstance(answer, LinkError) or right(both, request, answer) for request, answer in answers
         )
-        assert lost < 40  # three attempts, each with two frames
+        assert lost < 40  # three attempts, each with up to five frames
 
 
 def test_a_monitor_tells_the_requests_of_both_sides_from_the_answers(both: ModuleType) -> None:
