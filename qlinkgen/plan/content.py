@@ -252,7 +252,8 @@ def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) ->
         case ItemsStep():
             _count(step, values[step.name])
             items = values[step.name]
-            assert isinstance(items, list)
+            if not isinstance(items, list):  # of another case of a choice
+                raise Unsendable(step.name, items)
             return pack_items(step, [_checked(step.name, step.number, item) for item in items])
         case RecordStep():
             return _record(step.name, step.record, values[step.name])
@@ -264,7 +265,8 @@ def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) ->
 
 def _packed_records(step: RecordsStep, value: object) -> bytes:
     _count(step, value)
-    assert isinstance(value, list)
+    if not isinstance(value, list):  # of another case of a choice
+        raise Unsendable(step.name, value)
     if step.last and not _ends(step, value):
         raise Unsendable(step.name, value)
     return b"".join(_record(f"{step.name}[{i}]", step.record, each) for i, each in enumerate(value))
