@@ -53,7 +53,9 @@ def dissect(plan: Plan, wire: bytes, direction: Direction, request: bytes = b"")
         kind = bad.kind
     else:
         kind = ""
-    walk = _EndedWalk if plan.frame.whole else _Walk
+    frame = plan.frames[direction]
+    frame = _kind_of(frame, wire) if frame.kinds else frame
+    walk = _EndedWalk if frame.whole else _Walk
     return walk(codec, wire, direction, request, kind).run()
 
 

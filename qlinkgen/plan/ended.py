@@ -143,6 +143,11 @@ class EndedReader(FrameReader):
 def frame_reader(plan: FramePlan, known: Mapping[int, MessagePlan]) -> FrameReader | KindsReader:
     """The reader of frames of parts; ``known`` are the messages of their direction, by number."""
     if plan.kinds:
-        return KindsReader(plan, known)
+        return KindsReader([(each, _reader(each, known)) for each in plan.kinds])
+    return _reader(plan, known)
+
+
+def _reader(plan: FramePlan, known: Mapping[int, MessagePlan]) -> FrameReader:
+    """The reader of frames of one kind."""
     kind = EndedReader if plan.whole else FrameReader
     return kind(plan, known)

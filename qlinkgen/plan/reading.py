@@ -6,7 +6,7 @@ split.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import assert_never
 
@@ -382,9 +382,9 @@ class FrameReader:
 class KindsReader:
     """Reads frames of several kinds, of which at most one begins at a place."""
 
-    def __init__(self, plan: FramePlan, known: Mapping[int, MessagePlan]) -> None:
-        """``known`` are the messages of the direction of the frames, by number."""
-        self._kinds = [(each, FrameReader(each, known)) for each in plan.kinds]
+    def __init__(self, kinds: Sequence[tuple[FramePlan, FrameReader]]) -> None:
+        """``kinds`` are the kinds, each with its reader."""
+        self._kinds = kinds
 
     def read(self, wire: bytes, start: int = 0, *, hunting: bool = False) -> Taken:
         """The frame that begins at ``start``; see `FrameReader.read`."""

@@ -145,6 +145,10 @@ class _Checker:
         if kind.frame.directed:
             what = f"parts of {kind.name} are only in one direction"
             self._error(path, what, "write two kinds, one for each direction")
+        end = kind.frame.part("terminator")
+        if end is not None and end.constant == kind.frame.preamble:
+            what = f"{kind.name} begins with the bytes that end it"
+            self._error((*path, end.name), what, "let it begin with other bytes")
         for part in kind.frame.parts:
             if wrong := _excess(part):
                 what = f"{part.name} of {kind.name} {wrong}, which kinds of frame do not have"
@@ -226,8 +230,8 @@ class _Checker:
 
 def _excess(part: Part) -> str:
     """What kinds of frame do not have, "" if the part is right."""
-    if part.role == "terminator":
-        return "is a terminator"
+    if part.role == "terminator" and part.shared:
+        return "may begin the next frame"
     if part.trim is not None:
         return "is trimmed"
     if part.checksum and part.checksum.every:

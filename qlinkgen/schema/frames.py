@@ -180,7 +180,7 @@ class FrameBuilder:
         check_conditions(frame, path, self._report)
         stated = "coding" if self._file.frame.coding is not None else "stuffing"
         check_unique(frame, ("frame", stated), self._report)
-        check_terminator_part(frame, self._report)
+        check_terminator_part(frame, path, self._report)
         if frame.ends_idle:
             self._check_idle(frame, path)
         return True

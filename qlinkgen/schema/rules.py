@@ -226,10 +226,11 @@ _ALL = (
     Rule(
         "bad-kinds",
         "Kinds of frame begin with constants that tell them apart, and each message knows its kind.",
-        "A receiver tries each kind where one may begin. Kinds have no terminator, idle line, stuffing, "
-        "coding, trim or blocks. A value or a counter of several kinds is the same in all. A message without "
-        "frame travels in the kinds that no message names, which then have the same parts except constants, "
-        "lengths and check values; the shortest one that fits is sent.",
+        "A receiver tries each kind where one may begin. Kinds have no idle line, stuffing, coding, trim "
+        "or blocks, and do not end with the bytes that they begin with. A value or a counter of several "
+        "kinds is the same in all. A message without frame travels in the kinds that no message names, "
+        "which then have the same parts except constants, lengths and check values; the shortest one that "
+        "fits is sent.",
     ),
     Rule(
         "short-frame",

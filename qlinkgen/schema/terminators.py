@@ -7,21 +7,19 @@ from typing import assert_never
 
 from qlinkgen.model.coding import ALL_BYTES, Alphabet
 from qlinkgen.model.fields import Field, Record, Records
-from qlinkgen.model.frame import DelimitedFrame, Frame, Part, PartBits
+from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds, Part, PartBits
 from qlinkgen.model.message import Message
 from qlinkgen.model.types import Array, Bits, Blob, Chunk, Constant, Reserved, Scalar
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 
-_PARTS: Path = ("frame", "parts")
 
-
-def check_terminator_part(frame: DelimitedFrame, report: Reporter) -> None:
+def check_terminator_part(frame: DelimitedFrame, path: Path, report: Reporter) -> None:
     """Check the place of a terminator, and what a shared one needs."""
     end = frame.part("terminator")
     if end is None:
         return
-    place = (*_PARTS, end.name)
+    place = (*path, end.name)
     names = [part.name for part in frame.parts]
     if names.index(end.name) < names.index(frame.payload.name):
         what = f"{end.name} precedes the payload"
@@ -40,14 +38,21 @@ def check_terminator_part(frame: DelimitedFrame, report: Reporter) -> None:
 
 def check_terminator(frame: Frame | None, messages: Sequence[Message], report: Reporter) -> None:
     """Check that some byte of the terminator does not occur between the first part and it."""
-    if not isinstance(frame, DelimitedFrame) or frame.part("terminator") is None or report.failed:
+    if report.failed:
+        return
+    if isinstance(frame, FrameKinds):
+        for kind in frame.kinds:
+            carried = [each for each in messages if kind in frame.carrying(each.id)]
+            if kind.frame.part("terminator"):
+                _check_way(kind.frame, carried, ("frames", kind.name, "parts"), report)
+    if not isinstance(frame, DelimitedFrame) or frame.part("terminator") is None:
         return
     for way in frame.ways:
         sent = [each for each in messages if not frame.directed or each.direction == way]
-        _check_way(frame.towards(way), sent, report)
+        _check_way(frame.towards(way), sent, ("frame", "parts"), report)
 
 
-def _check_way(frame: DelimitedFrame, messages: Sequence[Message], report: Reporter) -> None:
+def _check_way(frame: DelimitedFrame, messages: Sequence[Message], path: Path, report: Reporter) -> None:
     end = frame.part("terminator")
     assert end is not None
     inner = frame.parts[: frame.parts.index(end)]
@@ -64,7 +69,7 @@ def _check_way(frame: DelimitedFrame, messages: Sequence[Message], report: Repor
     culprits = ["coded bytes"] if frame.coding else held
     what = f"{end.constant.hex(' ').upper()}, which ends a frame, can occur in {culprits[-1]}"
     hint = "add a coding such as {escape: 7D, xor: 20, of: [7E, 7D]}, or limit what the parts can hold"
-    report.error("terminator-in-frame", (*_PARTS, end.name), what, hint, of_key=True, needs=(("frame",),))
+    report.error("terminator-in-frame", (*path, end.name), what, hint, of_key=True, needs=(path[:1],))
 
 
 def _joined(alphabets: Iterable[Alphabet]) -> Alphabet:

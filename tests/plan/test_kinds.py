@@ -6,12 +6,14 @@ import random
 
 import pytest
 
+from qlinkgen.backends.python import load as load_codec
 from qlinkgen.plan import Plan, plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.dissect import dissect
 from qlinkgen.plan.reading import BadFrame
 from qlinkgen.plan.receive import Event, receiver
 from qlinkgen.schema import find, load
+from qlinkgen.schema.loader import loads
 
 _LOST = b"\x00\x16"
 
@@ -116,3 +118,55 @@ def test_no_intact_frame_is_lost_after_a_corruption(vesc: Plan) -> None:
         events = receiver(vesc, "response").run(b"".join(frames))
         found = [event.raw for event in events if event.decoded]
         assert [each for each in frames if each in found] == [*frames[:2], *frames[3:]]
+
+
+MIXED = """
+qlinkgen: 1
+protocol: {name: mixed, revision: "1", source: Made up}
+byteorder: little
+frames:
+  line:
+    parts:
+      start: {text: "$"}
+      code: {role: message, type: "text[2]"}
+      data: {role: payload, size: 0..20}
+      star: {role: terminator, text: "*"}
+      sum: {type: u8, as: "hex[2]", algorithm: xor8, over: [code, data]}
+  packet:
+    parts:
+      start: B5 62
+      code: {role: message, type: u8}
+      length: {type: u8, counts: data}
+      data: {role: payload, size: 0..20}
+      sum: {type: u16, algorithm: fletcher-8, over: [code, length, data]}
+bus: {kind: link}
+commands: {}
+messages:
+  depth: {frame: line, id: DP, separator: ",", fields: {depth: {type: u32, as: decimal}}}
+  speed: {frame: packet, id: 7, fields: {speed: u32}}
+"""
+
+
+def test_lines_and_packets_share_a_stream() -> None:
+    protocol, faults = loads(MIXED, "mixed.yaml")
+    assert protocol is not None, faults
+    plan = plan_of(protocol)
+    codec, generated = Codec(plan), load_codec(protocol)
+    line, packet = codec.encode("depth", {"depth": 76}), codec.encode("speed", {"speed": 0x2A24})
+    assert line == b"$DP76*15"
+    # The packet holds the bytes that begin and end a line.
+    stream = b"$*" + packet + line[:-1] + packet + line + b"$" + line
+    found = [
+        (event.decoded.message.name, event.offset)
+        for event in receiver(plan, "message").run(stream)
+        if event.decoded
+    ]
+    assert found == [("speed", 2), ("speed", 19), ("depth", 29), ("depth", 38)]
+    decoder = generated.StreamDecoder("message")
+    heard = [event for byte in stream for event in decoder.feed(bytes((byte,)))]
+    assert [each.NAME for each in heard if hasattr(each, "NAME")] == [name for name, _ in found]
+    assert generated.decode(line).depth == 76
+    for wire in (line, packet):
+        assert [fault.kind for fault in dissect(plan, wire, "message").faults] == []
+    with pytest.raises(BadFrame, match="length"):
+        codec.decode(b"$*", "message")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from qlinkgen.backends.c.coding import EndedView
 from qlinkgen.backends.c.crc import CheckView
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned, unsigned_type
@@ -15,6 +16,7 @@ from qlinkgen.backends.c.views import (
     PartsView,
     PlainView,
     directed,
+    ended_view,
     frame_view,
     own_prefix,
     parts_view,
@@ -42,6 +44,8 @@ class KindView:
         check: the algorithm of that, None if there is none or several.
         unused: parameters that the function that wraps does not use.
         get_values: statements that read the values of a received frame.
+        own: what the names of its functions begin with.
+        ended: its terminator, None without one; then ``frame`` and ``whole`` are views for its template.
     """
 
     name: str
@@ -55,6 +59,10 @@ class KindView:
     check: CheckView | None
     unused: list[str]
     get_values: list[str]
+    own: str
+    ended: EndedView | None
+    frame: FrameView
+    whole: PartsView
     most: int
     parts: PartsView
     plain: PlainView
@@ -67,6 +75,11 @@ class KindsView:
     kinds: Sequence[KindView]
     wrapped: Sequence[KindView]
     overhead: int
+
+    @property
+    def lasts(self) -> Sequence[str]:
+        """The last bytes of terminators."""
+        return list(dict.fromkeys(each.ended.last for each in self.kinds if each.ended))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,18 +158,25 @@ def _kind(
     parts = parts_view(writer, kind.max_wire)
     bits = frame.id_bits
     by_message = isinstance(kind.end, ByMessage)
+    number = writer.message_id(writer.number(kind.envelope.id))
+    address = parts.address_value if sender.address else "0U"
+    values = writer.get_values() if plan.frame.values else []
     return KindView(
         name=kind.name,
         carries=_carries(plan.frame, kind, bits),
         parameters=sender.parameters,
         arguments=_arguments(kind, frame, sender.id_type, sender.address),
-        id=writer.message_id(writer.number(kind.envelope.id)),
-        address=parts.address_value if sender.address else "0U",
+        id=number,
+        address=address,
         sized_by_message=by_message,
         key=check.key if check else "",
         check=check,
         unused=[sender.id] if not kind.envelope.id else [],
-        get_values=writer.get_values() if plan.frame.values else [],
+        get_values=values,
+        own=own_prefix(prefix, kind.name),
+        ended=ended_view(writer, frame.pass_decode_direction) if kind.whole else None,
+        frame=replace(frame, direction_unused=frame.needs_direction),
+        whole=replace(parts, id_value=number, address_value=address, get_values=values),
         most=kind.max_payload,
         parts=parts,
         plain=plain_view(writer, frame.pass_decode_direction),

@@ -372,11 +372,11 @@ def _parts_views(whole: Plan, plan: Plan, way: str, layouts: Layouts) -> PartsVi
         stuffed=_stuffed(writer, stuffing, passed) if stuffing else None,
         inserted=_inserted(rule) if rule else None,
         hunt=_hunted(writer, receiver) if isinstance(receiver, Hunt) else None,
-        ended=_ended(writer, passed) if plan.frame.whole else None,
+        ended=ended_view(writer, passed) if plan.frame.whole else None,
         coded=None
         if plan.frame.whole or not isinstance(transparency, Coded)
         else replace(
-            _ended(writer, passed), head_checks=list(writer.head_checks("at", passed, all_there=False))
+            ended_view(writer, passed), head_checks=list(writer.head_checks("at", passed, all_there=False))
         ),
     )
 
@@ -490,7 +490,8 @@ def _due(rule: Insertion, array: str, end: str, last: str) -> str:
     return " && ".join([f"(since >= {size}U)", *reversed(terms)])
 
 
-def _ended(writer: PartWriter, directed: str) -> EndedView:
+def ended_view(writer: PartWriter, directed: str) -> EndedView:
+    """The view of a frame that a terminator or a silence ends."""
     envelope, coded, end = writer.envelope, writer.frame.transparency, writer.frame.end
     assert isinstance(coded, Coded)
     data, after, paired = b"", 0, False

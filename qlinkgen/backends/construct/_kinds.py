@@ -11,25 +11,14 @@ from ._fields import Message, Values
 from ._frames import Constant, DelimitedFrame, Frame, FrameError, Part
 
 
-class Kind(DelimitedFrame):
+class AnyKind(Frame):
     """A kind of frame: ``base`` is what ids have more than the number in the frame.
 
     Its payloads have at least ``least`` bytes.
     """
 
-    def __init__(
-        self,
-        parts: Sequence[Part],
-        messages: Iterable[Message],
-        *,
-        base: int = 0,
-        least: int = 0,
-        address: str = "",
-    ) -> None:
-        super().__init__(parts, messages, address=address)
-        self.by_id = {each.id - base: each for each in self.by_name.values()}
-        self.base = base
-        self.least = least
+    base = 0
+    least = 0
 
     def wrap(
         self,
@@ -50,17 +39,35 @@ class Kind(DelimitedFrame):
         return message.name in self.by_name and self.least <= size <= self.payload.most
 
 
+class Kind(AnyKind, DelimitedFrame):
+    """A kind of frame whose end follows from a length or from its message."""
+
+    def __init__(
+        self,
+        parts: Sequence[Part],
+        messages: Iterable[Message],
+        *,
+        base: int = 0,
+        least: int = 0,
+        address: str = "",
+    ) -> None:
+        super().__init__(parts, messages, address=address)
+        self.by_id = {each.id - base: each for each in self.by_name.values()}
+        self.base = base
+        self.least = least
+
+
 class Kinds(Frame):
     """One frame of several kinds, the shortest one that carries the message and has room for its payload."""
 
-    def __init__(self, *kinds: Kind) -> None:
+    def __init__(self, *kinds: AnyKind) -> None:
         Construct.__init__(self)
         self.kinds = kinds
         self.by_name = {
             name: message for kind in kinds for name, message in kind.by_name.items()
         }
 
-    def kind_of(self, message: Message, size: int) -> Kind:
+    def kind_of(self, message: Message, size: int) -> AnyKind:
         """The kind of frame for a payload of a size, or else the longest that carries the message."""
         carrying = [kind for kind in self.kinds if message.name in kind.by_name]
         return next(

@@ -59,6 +59,7 @@ def live(protocol: Protocol, options: Options | None = None) -> Live:
         "_fasked",
         "_fconditional",
         "_kinds",
+        "_fended",
     )
     modules = ("construct", *(f"{__package__}.{name}" for name in own))
     names: dict[str, Value] = {"Decimal": Decimal, "float": float}

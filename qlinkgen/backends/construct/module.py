@@ -219,7 +219,10 @@ def _kinds(plan: Plan, direction: Direction, messages: Mapping[str, str]) -> Cal
         settings: dict[str, Node] = {"base": hexadecimal(kind.base)} if kind.base else {}
         settings |= {"least": kind.envelope.payload.least} if kind.envelope.payload.least else {}
         settings |= {"address": record_key(kind.address)} if kind.address else {}
-        calls.append(Call("Kind", (Ref(_kind_layout(kind)), chosen), tuple(settings.items())))
+        name = "EndedKind" if kind.whole else "Kind"
+        if kind.whole:
+            settings |= dict(_ended_at(kind))
+        calls.append(Call(name, (Ref(_kind_layout(kind)), chosen), tuple(settings.items())))
     return Call("Kinds", tuple(calls))
 
 
@@ -359,15 +362,22 @@ def _ended(
     assert isinstance(coded, Coded)
     bare = (("bare", True),) if isinstance(frame.receiver, Rescan) and frame.receiver.bare else ()
     coding = (("coding", Sequence(tuple(map(_stage, coded.stages)))),) if coded.stages else ()
-    over = tuple(part.name for part in frame.envelope.between(coded.front, coded.back))
     least = (("least", frame.envelope.payload.least),) if frame.envelope.payload.least else ()
     paired: tuple[tuple[str, Node], ...] = ()
-    last: tuple[tuple[str, Node], ...] = ()
     if isinstance(end, ByTerminator):
-        last = (("end", end.part.name),)
         paired = (("paired", True),) if end.paired is not None else ()
-    places = (*last, ("most", frame.max_wire), ("over", Sequence(over)), *least, *paired)
+    places = (*_ended_at(frame), *least, *paired)
     return Call("EndedFrame", (layout, messages), (*address, *bare, *coding, *places))
+
+
+def _ended_at(frame: FramePlan) -> Iterator[tuple[str, Node]]:
+    """What tells the end of a frame that a terminator or a silence ends."""
+    coded, end = frame.transparency, frame.end
+    assert isinstance(coded, Coded)
+    if isinstance(end, ByTerminator):
+        yield "end", end.part.name
+    yield "most", frame.max_wire
+    yield "over", Sequence(tuple(part.name for part in frame.envelope.between(coded.front, coded.back)))
 
 
 def _stage(coding: Stage) -> Call:

@@ -35,6 +35,7 @@ from qlinkgen.plan.coding import Add, Escaping, Insertion
 from qlinkgen.plan.ends import ByLength, ByMark, ByTerminator, Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import OneOf, Within
+from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
     AddressPart,
     BlocksPart,
@@ -207,7 +208,7 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
         length=length,
         stuffing=_stuffing(plan),
         idle=_idle(plan.frame.idle),
-        ended=_ended(plan, bare=bare) if plan.frame.whole else None,
+        ended=ended_view(plan.frame, bare=bare) if plan.frame.whole else None,
         preamble=literal(envelope.preamble) if envelope.preamble else "",
         begins_with=envelope.preamble.hex(" "),
         header=envelope.header_size,
@@ -281,8 +282,9 @@ def _idle(silence: Silence | None) -> tuple[float, float] | None:
     return (float(silence.byte_times), float(silence.seconds)) if silence else None
 
 
-def _ended(plan: Plan, *, bare: bool) -> EndedView:
-    envelope, coded, end = plan.frame.envelope, plan.frame.transparency, plan.frame.end
+def ended_view(frame: FramePlan, *, bare: bool) -> EndedView:
+    """The view of a terminator, or of a frame that a silence ends."""
+    envelope, coded, end = frame.envelope, frame.transparency, frame.end
     assert isinstance(coded, Coded)
     last, after, paired = b"", 0, False
     if isinstance(end, ByTerminator):
@@ -292,17 +294,17 @@ def _ended(plan: Plan, *, bare: bool) -> EndedView:
         terminator=literal(last) if last else "",
         last=literal(last[-1:]),
         pair=literal(last[:1]) if paired else "",
-        kept=plan.frame.kept,
+        kept=frame.kept,
         closing=closing,
         after=after,
-        limit=plan.frame.max_wire - after,
+        limit=frame.max_wire - after,
         lead=lead,
         front=coded.front,
         back=coded.back,
         splits=(coded.front, coded.back) != (lead, closing),
         least=envelope.payload.least,
-        lines=plan.frame.lines,
-        flag=bool(plan.frame.flag),
+        lines=frame.lines,
+        flag=bool(frame.flag),
         checks=list(_ended_checks(envelope, bare=bare)),
         coding=coding_view(coded.stages) if coded.stages else None,
     )

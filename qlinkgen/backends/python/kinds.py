@@ -10,7 +10,8 @@ from qlinkgen.backends.python import integers, pieces, values
 from qlinkgen.backends.python.decode import Decoder
 from qlinkgen.backends.python.encode import Encoder
 from qlinkgen.backends.python.frame_checks import check_view, placed, seed_name
-from qlinkgen.backends.python.frame_views import CheckView, FrameView, PlacedCheck
+from qlinkgen.backends.python.frame_views import CheckView, EndedView, FrameView, PlacedCheck
+from qlinkgen.backends.python.frames import ended_view
 from qlinkgen.backends.python.layout import in_hex, literal
 from qlinkgen.backends.python.names import attribute, natural
 from qlinkgen.backends.python.place import Place
@@ -65,6 +66,9 @@ class KindView:
         seeded: that covers attributes of the message.
         checked_values: statements that convert and check the values of the frame of ``message``.
         held_values: statements that set the values of ``message`` from ``frame``.
+        ended: its terminator, None without one.
+        least: minimum size of its payload.
+        most: maximum size of it.
     """
 
     name: str
@@ -87,6 +91,10 @@ class KindView:
     seeded: bool
     checked_values: Sequence[str]
     held_values: Sequence[str]
+    ended: EndedView | None
+    least: int
+    most: int
+    lead: str
 
 
 @dataclass(frozen=True)
@@ -123,6 +131,7 @@ class KindsView:
         slots: the names of attributes of all messages.
         seeds: attributes of message classes that check values cover.
         counted: some kinds have a counter.
+        lasts: the last bytes of terminators.
     """
 
     title: str
@@ -137,6 +146,7 @@ class KindsView:
     slots: Sequence[str]
     seeds: Sequence[str]
     counted: bool
+    lasts: Sequence[str]
     check: CheckView | None
 
     template = "kinds"
@@ -165,11 +175,12 @@ def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
         firsts=[literal(bytes((first,))) for first in firsts],
         by_first=[(in_hex(first), kinds) for first, kinds in firsts.items()],
         families=[(in_hex(base), kinds) for base, kinds in families.items()],
-        measured=any(not view.size for view in views.values()),
+        measured=any(not view.size and view.ended is None for view in views.values()),
         values=[_value(member, make.place) for member in plan.frame.values.values()],
         slots=sorted([*([address.name] if name else []), *map(attribute, plan.frame.values)], key=natural),
         seeds=sorted({seed_name(seed) for each in plan.frame.kinds for seed in _seeds(each)}),
         counted=plan.protocol.counter is not None,
+        lasts=list(dict.fromkeys(view.ended.last for view in views.values() if view.ended)),
         check=_selectable(list(views.values())),
         makers=frozenset(check.view.maker for view in views.values() for check in view.checks),
     )
@@ -195,7 +206,7 @@ def _kind(frame: FramePlan, plan: Plan, make: Maker) -> KindView:
     envelope = frame.envelope
     carried = next((each for each in plan.messages if frame in each.frames), None)
     members = Members(envelope, carried, make) if carried and envelope.values else None
-    checks = {part.name: _check(envelope, part, frame.name) for part in envelope.checks}
+    checks = {part.name: _check(frame, part) for part in envelope.checks}
     base = f"{frame.base} + " if frame.base else ""
     addressed = bool(envelope.address)
     return KindView(
@@ -219,6 +230,10 @@ def _kind(frame: FramePlan, plan: Plan, make: Maker) -> KindView:
         number=base + _grouped(pieces.number(envelope, envelope.id, "frame"), base),
         address=pieces.number(envelope, envelope.address, "frame") if addressed else "None",
         verified=bool(envelope.checks),
+        ended=ended_view(frame, bare=False) if frame.whole else None,
+        least=envelope.payload.least,
+        most=envelope.payload.most,
+        lead=literal(envelope.preamble),
     )
 
 
@@ -226,9 +241,10 @@ def _grouped(number: str, base: str) -> str:
     return f"({number})" if base and " " in number else number
 
 
-def _check(envelope: Envelope, part: CheckPart, kind: str) -> PlacedCheck:
-    mark = _mark(envelope, part, kind)
-    found = placed(envelope, part, mark, early=part in envelope.header_checks)
+def _check(frame: FramePlan, part: CheckPart) -> PlacedCheck:
+    envelope = frame.envelope
+    mark = _mark(envelope, part, frame.name)
+    found = placed(envelope, part, mark, early=not frame.whole)
     return replace(found, view=check_view(part.check, mark.upper()))
 
 

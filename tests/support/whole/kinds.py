@@ -23,11 +23,13 @@ class Family:
     Attributes:
         name: what messages write, "" if they write nothing.
         ids: those in use.
+        ended: a terminator ends its frames, so it carries texts.
     """
 
     shape: Shape
     name: str
     ids: set[int] = field(default_factory=set)
+    ended: bool = False
 
     @property
     def spec(self) -> Doc:
@@ -73,10 +75,38 @@ def draw(rng: random.Random) -> Kinds:
     for each in families:
         each.shape.bus = families[0].shape.bus
     # Drawn from another source: the schemas of earlier seeds stay what they are.
-    _add_values(random.Random(repr(rng.getstate())), frames, families)
+    more = random.Random(repr(rng.getstate()))
+    _add_values(more, frames, families)
+    if more.random() < 0.35:
+        shape = _ended(more, leads.pop())
+        shape.bus = families[0].shape.bus
+        frames["line"] = {"parts": shape.frame["parts"]}
+        families.append(Family(shape, "line", ended=True))
     mixed = list(frames)
     rng.shuffle(mixed)
     return Kinds({name: frames[name] for name in mixed}, families)
+
+
+def _ended(rng: random.Random, lead: str) -> Shape:
+    """A kind of frame with a terminator, which no text holds."""
+    parts: Doc = {"start": lead, "code": {"role": "message", "type": "u8"}}
+    if rng.random() < 0.4:
+        parts["length"] = {"type": "u8", "counts": rng.choice((["data"], ["code", "data"]))}
+    parts["data"] = {"role": "payload", "size": rng.choice(("0..40", "0..64"))}
+    check: Doc = {"type": "u8", "algorithm": rng.choice(("xor8", "sum8")), "over": ["code", "data"]}
+    early = rng.random() < 0.3
+    if early:
+        parts["crc"] = check | {"as": "hex[2]"}
+    parts["close"] = {
+        "role": "terminator",
+        "value": rng.choice(("80", "FE 0A", "0D 8A", "80" if lead == "FF" else "FF")),
+    }
+    if not early and rng.random() < 0.6:
+        parts["crc"] = check | rng.choice(({}, {"as": "hex[2]"}))
+    if rng.random() < 0.3:
+        parts["last"] = rng.choice(("0A", "0D 0A"))
+    least, most = map(int, parts["data"]["size"].split(".."))
+    return Shape("kinds", {"parts": parts}, least, most, 7, "", has_length=True)
 
 
 def _add_values(rng: random.Random, frames: Doc, families: list[Family]) -> None:

@@ -118,11 +118,11 @@ class _Maker:
             makes = replace(maker, shape=shape)
             asks = bool(shape.address_bits) or not several.addressed
             tiny = shape.id_bits == 0
-            for _ in range(self.rng.randint(0, 2) if asks and not tiny else 0):
+            for _ in range(self.rng.randint(0, 2) if asks and not tiny and not family.ended else 0):
                 command = self._command(shape, makes, bus, attributes=False)
                 found["commands"][self.words.name(taken)] = command | family.spec
             for _ in range(1 if tiny else self.rng.randint(1, 2)):
-                message = self._message(shape, makes, "messages")
+                message = self._message(shape, makes, "messages", texts=family.ended)
                 if not asks or tiny:
                     message["direction"] = "response"
                 found["messages"][self.words.name(taken)] = message | family.spec
@@ -144,7 +144,7 @@ class _Maker:
             if sent and rng.random() < 0.3:
                 spec["response"] = rng.choice(sent)
                 continue
-            family = rng.choice(several.families)
+            family = rng.choice([each for each in several.families if not each.ended])
             if family.name and family.shape.id_bits and rng.random() < 0.5:
                 self._ids = family.ids
                 fields = replace(maker, shape=family.shape).fields(Room.of(family.shape))
@@ -158,7 +158,7 @@ class _Maker:
         rng = self.rng
         fit = [each for each in found["commands"].values() if self._may_have_steps(each)]
         asking = [each for each in several.families if each.shape.address_bits or not several.addressed]
-        asking = [each for each in asking if each.name and each.shape.id_bits]
+        asking = [each for each in asking if each.name and each.shape.id_bits and not each.ended]
         if not fit or isinstance(fit[0]["response"], str) or "separator" in fit[0]:
             return
         steps: list[Doc] = []
@@ -504,14 +504,14 @@ class _Maker:
             echoes[name] = {"type": request[name], "echo": True}
         return maker.fields(Room.of(shape), echoes)
 
-    def _message(self, shape: Shape, maker: FieldMaker, kinds: str) -> Doc:
+    def _message(self, shape: Shape, maker: FieldMaker, kinds: str, *, texts: bool = False) -> Doc:
         message: Doc = self._identified(shape)
         direction = "request" if shape.kind == "packet" else self.rng.choice(("request", "response", None))
         if shape.directed:
             direction = direction or "request"
         if direction and kinds != "undirected":
             message["direction"] = direction
-        if self._separable(shape) and self.rng.random() < 0.3:
+        if texts or (self._separable(shape) and self.rng.random() < 0.3):
             separator = self.rng.choice((",", {"before": ","}))
             return self._described(message | {"separator": separator, "fields": maker.texts(Room.of(shape))})
         return self._described(message | {"fields": maker.fields(Room.of(shape))})

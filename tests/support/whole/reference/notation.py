@@ -67,14 +67,15 @@ def _named(document: Doc) -> None:
         for name, spec in parts.items():
             kind = spec.get("type") if isinstance(spec, dict) else spec
             given = types.get(kind) if isinstance(kind, str) else None
-            if given and "'role'" in str(given.get("bits")):
+            if given and _has_roles(given):
                 own = {key: each for key, each in spec.items() if key != "type"} if spec != kind else {}
                 parts[name] = {**given, **own}
-    document["types"] = {
-        name: each
-        for name, each in types.items()
-        if not (isinstance(each, dict) and "'role'" in str(each.get("bits")))
-    }
+    document["types"] = {name: each for name, each in types.items() if not _has_roles(each)}
+
+
+def _has_roles(kind: Any) -> bool:
+    """Whether the bits of a type, which may be a name in short, have roles."""
+    return isinstance(kind, dict) and "'role'" in str(kind.get("bits"))
 
 
 def load(text: str) -> Doc:
