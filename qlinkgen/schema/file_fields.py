@@ -5,7 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Discriminator, Field, PrivateAttr, StrictBool, StrictInt, Tag
+from pydantic import (
+    Discriminator,
+    Field,
+    GetJsonSchemaHandler,
+    PrivateAttr,
+    StrictBool,
+    StrictInt,
+    Tag,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from qlinkgen.schema.file_algorithms import AnyAlgorithm
 from qlinkgen.schema.file_base import BRANCH, Fact, FileMapping, Lifetime, Names
@@ -182,10 +192,19 @@ def _case_form(value: object) -> str:
     return f"{BRANCH}type" if field else f"{BRANCH}fields"
 
 
+class _CaseForms:
+    """Lets editors take a mapping with a type for either form: a field may be called type."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"anyOf": handler(core)["oneOf"]}
+
+
 #: What a choice is in one case: a type, or a record of these fields; {} for nothing.
 CaseSpec = Annotated[
     Annotated[ShortField, Tag(f"{BRANCH}type")] | Annotated[dict[str, ShortField], Tag(f"{BRANCH}fields")],
     Discriminator(_case_form),
+    _CaseForms,
 ]
 
 
