@@ -156,7 +156,9 @@ def slave(pty: PtyPort, codec: Any) -> Iterator[Registers]:
 def test_our_slave_answers_its_client(pty: PtyPort, slave: Registers, framing: str) -> None:
     from pymodbus.client import ModbusSerialClient
     from pymodbus.framer import FramerType
+    from pymodbus.pdu import ModbusPDU
 
+    unknown_request = type("Unknown", (ModbusPDU,), {"function_code": 0x41, "encode": lambda _: b""})
     framer = FramerType[framing.upper()]
     client = ModbusSerialClient(pty.path, framer=framer, baudrate=115200, timeout=10, retries=0)
     assert client.connect()
@@ -172,7 +174,7 @@ def test_our_slave_answers_its_client(pty: PtyPort, slave: Registers, framing: s
         assert slave.values[11] == 0xABCD
         refused = client.read_holding_registers(99, count=2, device_id=NODE)
         assert (refused.isError(), refused.exception_code) == (True, 2)
-        unknown = client.read_device_information(device_id=NODE)
+        unknown = client.execute(False, unknown_request(dev_id=NODE))
         assert (unknown.isError(), unknown.exception_code) == (True, 1)
         assert client.read_holding_registers(20, count=3, device_id=NODE).registers == [7, 8, 9]
     finally:

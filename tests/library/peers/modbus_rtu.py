@@ -9,6 +9,7 @@ from pymodbus.framer import FramerBase, FramerRTU
 from pymodbus.pdu import DecodePDU, ModbusPDU
 from pymodbus.pdu import bit_message as bits
 from pymodbus.pdu import file_message as files
+from pymodbus.pdu import mei_message as mei
 from pymodbus.pdu import other_message as other
 from pymodbus.pdu import register_message as registers
 from pymodbus.pdu.diag_message import DiagnosticBase
@@ -107,9 +108,20 @@ _KINDS: Mapping[str, tuple[type[ModbusPDU], Mapping[str, str]]] = {
 _NAMES = {kind: name for name, (kind, _) in _KINDS.items()}
 #: What pymodbus calls a value, and back; it has two states each of a coil, and of a server.
 _COIL = {"off": [False], "on": [True]}
-_FUNCTIONS = {"diagnostics": 8} | {
-    name.partition(".")[0]: kind.function_code for name, (kind, _) in _KINDS.items()
+_LEVELS = {"basic": 1, "regular": 2, "extended": 3, "one": 4}
+_MORE = {"none": 0, "follow": 0xFF}
+_FILES: Mapping[str, Callable[..., ModbusPDU]] = {
+    "read_file_record.request": files.ReadFileRecordRequest,
+    "read_file_record.response": files.ReadFileRecordResponse,
+    "write_file_record.request": files.WriteFileRecordRequest,
+    "write_file_record.response": files.WriteFileRecordResponse,
 }
+_FUNCTIONS = {
+    "diagnostics": 8,
+    "read_file_record": 0x14,
+    "write_file_record": 0x15,
+    "read_device_identification": 0x2B,
+} | {name.partition(".")[0]: kind.function_code for name, (kind, _) in _KINDS.items()}
 _CODES = (
     None, "illegal_function", "illegal_data_address", "illegal_data_value", "server_device_failure",
     "acknowledge", "server_device_busy", None, "memory_parity_error", None, "gateway_path_unavailable",
@@ -136,6 +148,12 @@ def pdu_of(record: Record) -> ModbusPDU | None:
     elif name.startswith("diagnostics"):
         pdu = DiagnosticBase(message=fields["data"])
         pdu.sub_function_code = fields["function"]
+    elif name in _FILES:
+        pdu = _FILES[name](records=list(map(_file_record, fields["parts"])))
+    elif name.startswith("read_device_identification"):
+        if fields["level"] == 0 or not _distinct(fields):
+            return None
+        pdu = _identification(name, fields)
     elif name == "report_server_id.response":
         *identifier, state = bytes.fromhex(fields["data"])
         if state not in {0, 0xFF}:
@@ -148,6 +166,29 @@ def pdu_of(record: Record) -> ModbusPDU | None:
             return None
         pdu = kind(**given)
     pdu.dev_id = record["node"]
+    return pdu
+
+
+def _file_record(part: Mapping[str, Any]) -> files.FileRecord:
+    data = b"".join(each.to_bytes(2, "big") for each in part.get("registers", ()))
+    size = 0 if data else 2 * part["count"]
+    return files.FileRecord(part.get("file", 0), part.get("record", 0), data, size)
+
+
+def _distinct(fields: Mapping[str, Any]) -> bool:
+    """Whether no number of an object occurs twice; pymodbus has one text for each."""
+    numbers = [each["number"] for each in fields.get("objects", ())]
+    return len({*numbers}) == len(numbers)
+
+
+def _identification(name: str, fields: Mapping[str, Any]) -> ModbusPDU:
+    level = _LEVELS.get(fields["level"], fields["level"])
+    if name.endswith(".request"):
+        return mei.ReadDeviceInformationRequest(read_code=level, object_id=fields["first"])
+    texts = {each["number"]: each["value"].encode() for each in fields["objects"]}
+    pdu = mei.ReadDeviceInformationResponse(read_code=level, information=texts)
+    pdu.conformity, pdu.next_object_id = fields["conformity"], fields["next"]
+    pdu.more_follows = _MORE.get(fields["more"], fields["more"])
     return pdu
 
 
@@ -180,10 +221,17 @@ def framer(kind: type[FramerBase], direction: Direction) -> FramerBase:
     return kind(DecodePDU(is_server=direction == "request"))
 
 
+def is_read(function: int, direction: Direction) -> bool:
+    """Whether pymodbus reads such a frame; it refuses requests for odd numbers of registers of files."""
+    return (function, direction) != (0x14, "request")
+
+
 def build(record: Record) -> bytes | None:
     pdu = pdu_of(record)
     return None if pdu is None else framer(FramerRTU, "request").buildFrame(pdu)
 
 
 def read(wire: bytes, direction: Direction) -> Record | None:
+    if not is_read(wire[1], direction):
+        return None
     return record_of(framer(FramerRTU, direction).handleFrame(wire, 0, 0)[1])
