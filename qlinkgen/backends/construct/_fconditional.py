@@ -22,7 +22,9 @@ class Present(NamedTuple):
     initial: Sequence[bytes]
     tests: Sequence[tuple[str, int, int, Sequence[tuple[int, int]], bool]]
 
-    def holds(self, cells: Mapping[str, bytes], integers: Mapping[str, Construct]) -> bool:
+    def holds(
+        self, cells: Mapping[str, bytes], integers: Mapping[str, Construct]
+    ) -> bool:
         """Whether a frame with these parts in its header has them."""
         return all(
             name in cells
