@@ -42,6 +42,13 @@ commands:
       - {name: end, send: {id: 0x12, fields: {}}}
       - {name: sum, receive: {id: 0x13, fields: {sum: u16}}}
       - {name: taken, send: {id: 0x14, fields: {}}}
+  dump:
+    id: 0x30
+    request: {size: {type: u8, range: 1..4}}
+    steps:
+      - {receive: ack}
+      - {name: ready, send: {id: 0x31, fields: {}}}
+      - {name: bytes, receive: {id: 0x32, fields: {data: "bytes[request.size]"}}}
   count: {id: 0x20, request: {}, response: {number: u8}}
 """
 PROGRAM = r"""

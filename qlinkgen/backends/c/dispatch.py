@@ -219,18 +219,23 @@ def _entry(
         right=decoded if message.fields else "frame->size == 0U",
         unless_silent=" && !slave->broadcast" if answer and addressing == "either" else "",
         replies=replies,
-        sizes=_sizes(names.command_of(message)) if answer else [],
+        sizes=_sizes(names.command_of(message), message, answer),
         turn=turn_name(names, message) if exchange and exchange.turn else "",
         following=turn_name(names, following) if following else "",
     )
 
 
-def _sizes(command: Command | None) -> list[tuple[str, str]]:
-    """Members of the response, and those of the request, in the type of the former."""
-    fields = {field.name: field for field in command.response.fields} if command and command.response else {}
+def _sizes(command: Command | None, sent: Message, answer: Message | None) -> list[tuple[str, str]]:
+    """Members of the response, and those of the request, in the type of the former.
+
+    In a dialogue, ``sent`` need not be that request, nor its first ``answer`` that response.
+    """
+    if command is None or answer is None or (sent, answer) != (command.request, command.response):
+        return []
+    fields = {field.name: field for field in answer.fields}
     return [
         (f"{name}_{fields[name].quantity}", f"({count_type(fields[name].most)})request.{member(asked)}")
-        for name, asked in (command.sizes if command else ())
+        for name, asked in command.sizes
         if not fields[name].fixed
     ]
 
