@@ -47,12 +47,11 @@ class CodingBuilder:
             return (), (), False
         many = isinstance(spec, list)
         specs = spec if isinstance(spec, list) else [spec]
-        known = self._silent or any(part.role == "terminator" for part in self._parts)
-        if not known:
+        if not self._known:
             self._check_open(specs)
         after = [index for index, each in enumerate(specs) if each.checked == "after"]
         for index in after:
-            self._check_after(specs[index], (*_PATH, index) if many else _PATH, known=known)
+            self._check_after(specs[index], (*_PATH, index) if many else _PATH)
         codings = [self._coding(each, (*_PATH, index) if many else _PATH) for index, each in enumerate(specs)]
         for index, coding in enumerate(codings[:-1]):
             if isinstance(coding, Cobs):
@@ -68,7 +67,13 @@ class CodingBuilder:
                 self._error(path, what, "name the same parts in each, or only in one")
             else:
                 coded = self._coded(over, path)
+                self._check_start(coded, codings, path)
         return tuple(each for each in codings if each is not None), coded, bool(after)
+
+    @property
+    def _known(self) -> bool:
+        """Whether the end of a frame is known before it is decoded."""
+        return self._silent or any(part.role == "terminator" for part in self._parts)
 
     def _check_open(self, specs: Sequence[CodingSpec]) -> None:
         """Check that a receiver can decode as it reads, since nothing tells the end before."""
@@ -83,11 +88,11 @@ class CodingBuilder:
             needs = (_PATH, ("frame", "parts"))
             self._report.error("not-applicable", _PATH, what, hint, of_key=True, needs=needs)
 
-    def _check_after(self, spec: CodingSpec, path: Path, *, known: bool) -> None:
+    def _check_after(self, spec: CodingSpec, path: Path) -> None:
         """Check that check values can cover coded bytes: those of a payload with a length."""
         place = (*path, "checked")
         payload = next(part.name for part in self._parts if part.role == "payload")
-        if known:
+        if self._known:
             what = "check values of a frame with a terminator or a silence cover the bytes before the coding"
             self._error(place, what, "remove checked: after")
         elif spec.insert is None and spec.add is None:
@@ -101,6 +106,17 @@ class CodingBuilder:
 
     def _error(self, path: Path, what: str, hint: str) -> None:
         self._report.error("bad-coding", path, what, hint, of_key=True)
+
+    def _check_start(self, coded: Sequence[str], codings: Sequence[Coding | None], path: Path) -> None:
+        """Check that the first constant is sent as it is: receivers search for it before they decode.
+
+        Stuffing may cover it, as it never changes the first byte.
+        """
+        start = self._parts[0]
+        stuffed = not self._known and isinstance(codings[0], Insert)
+        if start.role == "constant" and start.name in coded and not stuffed:
+            what = f"'{start.name}' is coded, but receivers search for it as it is sent"
+            self._error(path, what, f"name all but {start.name}, and give it the bytes that are sent")
 
     # Parts
 

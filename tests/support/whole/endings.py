@@ -27,7 +27,8 @@ def openly(rng: random.Random, frame: Doc) -> None:
     names = list(frame["parts"])
     if any({"trim", "every"} & spec.keys() for spec in frame["parts"].values()):
         return
-    lead = int(frame["parts"][names[0]].get("role") == "constant")
+    start = frame["parts"][names[0]]
+    lead = int(start.get("role", "value" in start and "constant") == "constant")
     kinds: list[Doc] = [
         *(_escaped(rng).codings[0], _replaced(rng).codings[0]),
         *({"digits": "hex"}, {"pair": "complement"}, {"add": _hex(rng.randrange(256))}),
@@ -39,7 +40,7 @@ def openly(rng: random.Random, frame: Doc) -> None:
         coding = {"add": _hex(rng.randrange(1, 256)), "checked": "after"}
     elif rng.random() < 0.4:
         payload = next(at for at, name in enumerate(names) if frame["parts"][name].get("role") == "payload")
-        first, last = rng.randint(0, payload), rng.randint(payload, len(names) - 1)
+        first, last = rng.randint(lead, payload), rng.randint(payload, len(names) - 1)
         coding = {**coding, "over": names[first : last + 1]}
     elif not lead and rng.random() < 0.5:
         coding = {**coding, "over": names}
