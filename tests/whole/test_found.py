@@ -100,6 +100,15 @@ frames:
       crc: {type: u8, algorithm: sum8, over: [code, data]}
   short: {parts: {start: 24 58}}
 """
+_SILENT = """\
+frame:
+  parts:
+    code: {role: message, type: u8}
+    data: {role: payload, size: 0..40}
+    crc: {type: u8, algorithm: sum8, over: [code, data, attribute.salt]}
+    silence: {role: idle, time: 3.5 bytes, alone: true}
+bus: {kind: master_slave, baud: 9600}
+"""
 _BUS = "bus: {kind: master_slave, nodes: 1..8, broadcast: 9}\n"
 
 FOUND = {
@@ -166,6 +175,17 @@ FOUND = {
     ).replace("over: [code, data]", "over: [code, data, two]")
     + _BUS
     + "messages:\n  log: {id: 5, fields: {v: u8}}\n",
+    "a frame of the other direction that a silence ends, whose attribute C took for that of this one": _SILENT
+    + "attributes: {salt: {type: u8}}\nmessages:\n"
+    "  log: {id: 5, direction: request, attributes: {salt: 7}, fields: {v: u8}}\n"
+    + "".join(
+        f"  state_{each}: {{id: {each}, direction: response, attributes: {{salt: {each}}}, fields: {{}}}}\n"
+        for each in (0, 1, 2, 3, 4, 6, 7, 254, 255)
+    ),
+    "a text of a number out of range, for which C asked for a larger buffer": _PARTS
+    + _BUS
+    + 'messages:\n  log: {id: 5, separator: ",", fields: {v: {type: u24, as: "decimal[1..2]"}}}\n'
+    '  note: {id: 6, separator: ",", fields: {v: {type: u24, as: "hex[1..2]"}}}\n',
     "a count that a value adds, which C did not cover by the check value": _COUNTED.replace(
         "0..40}", "0..40}\n    crc: {type: u8, algorithm: sum8, over: [code, data]}"
     )

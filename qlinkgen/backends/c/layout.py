@@ -104,7 +104,7 @@ class Layouts:
         self._texts.add((text.base, verb))
         name = f"{self.prefix}_{verb}_{'decimal' if text.base == 10 else 'hex'}_"
         *others, value = given
-        others += [f"{text.least}U"] if verb == "size" else []
+        others += [f"{text.least}U", f"{text.most}U"] if verb == "size" else []
         wide = f"(uint64_t){value}" if storage(integer.bits) < 64 else value
         if text.base == 16:
             return f"{name}({', '.join([*others, wide])})"

@@ -94,7 +94,7 @@ static inline void {p}_put_decimal_(uint8_t *to, size_t size, size_t point, uint
 }}"""
 
 _SIZE_DECIMAL = """\
-static inline size_t {p}_size_decimal_(size_t least, size_t point, uint64_t value, uint64_t sign)
+static inline size_t {p}_size_decimal_(size_t least, size_t most, size_t point, uint64_t value, uint64_t sign)
 {{
     const bool negative = (value & sign) != 0U;
     uint64_t left = negative ? ((sign << 1) - value) : value;
@@ -109,6 +109,9 @@ static inline size_t {p}_size_decimal_(size_t least, size_t point, uint64_t valu
     }}
     if (negative) {{
         ++size;
+    }}
+    if (size > most) {{
+        size = most; /* the value is out of range */
     }}
     return (size > least) ? size : least;
 }}"""
@@ -163,13 +166,16 @@ static inline void {p}_put_hex_(uint8_t *to, size_t size, uint64_t value)
 }}"""
 
 _SIZE_HEX = """\
-static inline size_t {p}_size_hex_(size_t least, uint64_t value)
+static inline size_t {p}_size_hex_(size_t least, size_t most, uint64_t value)
 {{
     uint64_t left = value >> 4;
     size_t size = 1U;
     while (left > 0U) {{
         left >>= 4;
         ++size;
+    }}
+    if (size > most) {{
+        size = most; /* the value is out of range */
     }}
     return (size > least) ? size : least;
 }}"""
