@@ -137,6 +137,11 @@ class FramePlan:
         return isinstance(self.end, ByTerminator | BySilence)
 
     @property
+    def seeded(self) -> bool:
+        """Whether check values cover attributes of messages."""
+        return any(each.envelope.seeded for each in self.every)
+
+    @property
     def needs_request(self) -> bool:
         """Whether a response can be decoded only with its request."""
         return isinstance(self.receiver, InStep)

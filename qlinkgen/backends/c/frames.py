@@ -108,13 +108,8 @@ class FrameSection:
     @property
     def needs_ids(self) -> bool:
         """Whether receiving a frame depends on message ids, which are then defined before it."""
-        by_message = self.view.checks_header or self.view.sized_by_message or self.seeded
+        by_message = self.view.checks_header or self.view.sized_by_message or self.plan.frame.seeded
         return by_message or isinstance(self.plan.frame.receiver, Marks | InStep)
-
-    @property
-    def seeded(self) -> bool:
-        """Whether check values cover attributes of messages."""
-        return any(each.envelope.seeded for each in self.plan.frame.every)
 
     @property
     def request_sum(self) -> str:

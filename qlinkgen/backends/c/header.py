@@ -199,7 +199,7 @@ class Header:
             texts.append(
                 self._place("header_check", f=view, header_checks=header_checks, unused=[*unused, *address])
             )
-        if self._section.seeded:
+        if self._plan.frame.seeded:
             known = [Group(d, self._expected(messages)) for d, messages in received]
             seeds = seed_views(names, self._plan.messages)
             texts.append(self._place("seeds", f=view, seeds=seeds, known=known, unused=unused))

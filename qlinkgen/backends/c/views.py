@@ -136,8 +136,8 @@ def directed(plan: Plan) -> bool:
 
 def _uses_direction(frame: FramePlan) -> bool:
     """Whether a function that finds a frame in bytes depends on its direction."""
-    by_message, receiver = any(isinstance(each.end, ByMessage) for each in frame.every), frame.receiver
-    return frame.checks_header or by_message or (isinstance(receiver, Rescan) and receiver.seeded)
+    by_message = any(isinstance(each.end, ByMessage) for each in frame.every)
+    return frame.checks_header or by_message or frame.seeded
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
