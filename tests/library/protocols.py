@@ -22,11 +22,9 @@ from qlinkgen.cli.encode import compose
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.protocol import Protocol as Model
 from qlinkgen.plan import Plan, plan_of
-from qlinkgen.plan.codec import Codec
-from qlinkgen.plan.content import Unsendable
 from qlinkgen.schema import find, library, load
 from qlinkgen.schema.including import GROUPS
-from tests.support.random_raw import random_address, random_beside, random_present
+from tests.support.random_raw import random_frame
 
 #: A message as `qlinkgen decode` prints it.
 Record = Mapping[str, Any]
@@ -98,16 +96,7 @@ class Described:
 
     def wire(self, message: Message, rng: random.Random) -> bytes:
         """A frame of random values, made by the interpreter."""
-        beside = random_beside(self.model, message, rng)
-        address = random_address(message, rng) if message.addresses else None
-        for _ in range(200):
-            try:
-                return Codec(self.plan).encode(
-                    message.name, random_present(message.values, rng) | beside, address
-                )
-            except Unsendable:  # records of variable size can be too many together
-                continue
-        raise AssertionError(f"no {message.name} that fits its frame")
+        return random_frame(self.plan, message, rng)
 
     def record(self, wire: bytes, direction: Direction) -> Record:
         """The record of a frame, read by the generated decoder, with numbers as JSON has them."""

@@ -13,13 +13,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from qlinkgen.backends import python
-from qlinkgen.model.message import Message
-from qlinkgen.plan import Plan, plan_of
-from qlinkgen.plan.codec import Codec
+from qlinkgen.plan import plan_of
 from qlinkgen.schema import find, library, load, loads
 from tests.proof.corruption import EVERY_KIND
 from tests.proof.recovery import Result, Subject
-from tests.support.random_raw import random_address, random_beside, random_values
+from tests.support.random_raw import random_frame
 
 FRAMES = 600
 PAGE = Path(__file__).parents[2] / "docs" / "recovery.md"
@@ -112,7 +110,7 @@ def library_subject(name: str) -> Subject:
     plan, module, chance = plan_of(protocol), python.load(protocol), random.Random(name)
     direction = max(plan.received_directions, key=lambda each: len(plan.received(each)))
     messages = [protocol.by_name[each.name] for each in plan.received(direction)]
-    frames = list(dict.fromkeys(_random(plan, chance.choice(messages), chance) for _ in range(FRAMES)))
+    frames = list(dict.fromkeys(random_frame(plan, chance.choice(messages), chance) for _ in range(FRAMES)))
     arguments = () if direction == "message" else (direction,)
 
     def decoded(chunks: Iterable[bytes]) -> Sequence[bytes]:
@@ -121,13 +119,6 @@ def library_subject(name: str) -> Subject:
         return [event.to_frame() for event in events if not isinstance(event, module.Fault)]
 
     return Subject(frames, lambda each: frames[0][: each.randint(1, 4)], decoded)
-
-
-def _random(plan: Plan, message: Message, chance: random.Random) -> bytes:
-    """A frame of random values."""
-    values = dict(zip((each.name for each in message.values), random_values(message, chance), strict=True))
-    values |= random_beside(plan.protocol, message, chance)
-    return Codec(plan).encode(message.name, values, random_address(message, chance))
 
 
 def total(name: str) -> Result:

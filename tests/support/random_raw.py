@@ -12,6 +12,9 @@ from qlinkgen.model.frame import DelimitedFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Flags, Float, Length, Scalar
+from qlinkgen.plan import Plan
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.content import Unsendable
 
 Raw: TypeAlias = "int | list[int] | bytes | Mapping[str, Raw] | list[Mapping[str, Raw]] | None"
 
@@ -47,6 +50,17 @@ def random_address(message: Message, rng: random.Random) -> int:
         return 0
     first, last = rng.choice(message.addresses)
     return rng.choice((first, last, rng.randint(first, last)))
+
+
+def random_frame(plan: Plan, message: Message, rng: random.Random) -> bytes:
+    """A frame of legal values, made by the interpreter."""
+    for _ in range(200):
+        values = random_present(message.values, rng) | random_beside(plan.protocol, message, rng)
+        try:
+            return Codec(plan).encode(message.name, values, random_address(message, rng))
+        except Unsendable:  # records of variable size can be too many together
+            continue
+    raise AssertionError(f"no {message.name} that fits its frame")
 
 
 def damaged(stream: bytes, rng: random.Random, alphabet: bytes) -> bytes:
@@ -90,13 +104,28 @@ def _random(value: Value, rng: random.Random) -> Raw:
         case Record():
             return _record(kind.layout, rng)
         case Records():
-            return [_record(kind.layout, rng) for _ in range(_size(kind.length, rng))]
+            records = [_record(kind.layout, rng) for _ in range(_size(kind.length, rng))]
+            return _ended(kind, records, rng) if kind.last else records
         case _:
             assert_never(kind)
 
 
 def _record(layout: Layout, rng: random.Random) -> Mapping[str, Raw]:
     return random_present(layout.values, rng)
+
+
+def _ended(kind: Records, records: list[Mapping[str, Raw]], rng: random.Random) -> list[Mapping[str, Raw]]:
+    """Records of which the last one alone meets the condition of a last one."""
+    for index in range(len(records)):
+        final = index == len(records) - 1
+        while all(test.holds(_raw(records[index][test.value])) for test in kind.last) != final:
+            records[index] = _record(kind.layout, rng)
+    return records
+
+
+def _raw(number: Raw) -> int:
+    assert isinstance(number, int)
+    return number
 
 
 def _size(length: Length, rng: random.Random) -> int:
