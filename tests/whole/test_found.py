@@ -186,6 +186,20 @@ FOUND = {
     + _BUS
     + 'messages:\n  log: {id: 5, separator: ",", fields: {v: {type: u24, as: "decimal[1..2]"}}}\n'
     '  note: {id: 6, separator: ",", fields: {v: {type: u24, as: "hex[1..2]"}}}\n',
+    "a node in the header of answers alone, for which Python had no texts of faults of both": """\
+frame:
+  parts:
+    from: {role: source, type: u8}
+    code: {role: message, type: u8}
+    data: {role: payload, size: 0..9}
+    sum: {type: u8, algorithm: sum8, over: [from, code]}
+    to: {role: destination, type: u8}
+    close: {role: terminator, value: "10 0A"}
+  coding: {escape: 03, xor: 01, of: [03, 10]}
+bus: {kind: master_slave, nodes: 0..255, master: 234}
+commands:
+  ask: {id: 5, addressing: node, request: {v: u8}, response: {w: u8}, repeat: safe}
+""",
     "a count that a value adds, which C did not cover by the check value": _COUNTED.replace(
         "0..40}", "0..40}\n    crc: {type: u8, algorithm: sum8, over: [code, data]}"
     )
