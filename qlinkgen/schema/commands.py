@@ -366,8 +366,9 @@ class CommandBuilder:
             what = f"attribute {shown(key)} is not declared"
             self._report.error("unknown-attribute", place, what, hint, of_key=True, needs=needs)
         elif declared.values is None:
-            if not is_number(value, declared.type or ""):
-                what, hint = f"{key} cannot be {value}", f"use a number that fits {declared.type}"
+            if declared.type is not None and not is_number(value, declared.type or ""):
+                what = f"{key} cannot be {shown(value)}"
+                hint = f"use a number that fits {declared.type}"
                 self._report.error("unknown-attribute", place, what, hint, needs=needs)
         elif not any(value == allowed and type(value) is type(allowed) for allowed in declared.values):
             words = [shown(allowed).strip("'") for allowed in declared.values]

@@ -399,8 +399,12 @@ class FrameBuilder:
             return None
         place = (*path, "checksum")
         if spec.checksum.told != "checksum":
-            what = f"the checksum has role: {spec.checksum.told}"
-            self._report.error("bad-frame", (*place, "role"), what, "use role: checksum")
+            if spec.checksum.role:
+                what = f"the checksum has role: {spec.checksum.role}"
+                self._report.error("bad-frame", (*place, "role"), what, "use role: checksum")
+            else:
+                what, hint = "the checksum has no algorithm", "add algorithm: crc-16/modbus"
+                self._report.error("bad-frame", place, what, hint, of_key=True, absent=True)
             return None
         self._parts.reject(
             spec.checksum,

@@ -21,6 +21,8 @@ from qlinkgen.schema.source import Path
 from qlinkgen.schema.synonyms import type_hint
 from qlinkgen.schema.types import TypeBuilder
 
+#: The least number that hands over to a longer length: one below it states a size other than 0.
+_LEAST_OTHERWISE = 2
 _INTEGERS = {f"u{8 * size}": size for size in range(1, 9)}
 _SINGLE_ROLES = (
     "length",
@@ -181,6 +183,11 @@ class PartBuilder:
             what = f"{spec.otherwise} does not fit {scalar.bits} bits"
             self._report.error("value-does-not-fit", (*path, "otherwise"), what, f"use 0..{scalar.maximum}")
             return scalar
+        if spec.otherwise < _LEAST_OTHERWISE:
+            what = f"{spec.otherwise} leaves no numbers for the sizes of other frames"
+            hint = f"use {_LEAST_OTHERWISE}..{scalar.maximum}"
+            self._report.error("long-length", (*path, "otherwise"), what, hint)
+            return scalar
         most = spec.range.last if spec.range else Fraction(spec.otherwise - 1)
         if most.denominator != 1 or not 0 < most < spec.otherwise or (spec.range and spec.range.first > 0):
             what = f"{path[-1]} is {spec.otherwise} in long frames, which others do not reach"
@@ -216,6 +223,8 @@ class PartBuilder:
 
     def _value(self, name: str, spec: PartSpec, path: Path) -> Part:
         """A part with a value of every frame, or several in its bits."""
+        if spec.type is None:
+            return Part(name=name, role="bits", scalar=self.integer(spec, path))
         scalar, bits = self._pieces.value(name, spec, path)
         return Part(
             name=name,

@@ -133,7 +133,8 @@ def _explained(kind: str, seen: object, detail: ErrorDetails) -> tuple[str, str,
     """Rule, message and hint for an invalid value."""
     context = detail.get("ctx", {})
     if kind == "literal_error":
-        allowed = [word.strip("'") for word in context["expected"].replace(" or ", ", ").split(", ")]
+        given = context["expected"].replace("True", "true").replace(" or ", ", ")
+        allowed = [word.strip("'") for word in given.split(", ")]
         hint = value_hint(str(seen), allowed) or did_you_mean(
             str(seen), allowed, f"use {listed(allowed, 'or')}"
         )
