@@ -23,7 +23,7 @@ from qlinkgen.schema import loads
 from tests.support.cdriver import WARNINGS
 from tests.support.sharing import made_once
 
-STRICT = (*WARNINGS, "-Wshadow")
+STRICT = WARNINGS
 START = {
     "no start": "",
     "start": "start: {role: constant, value: 0xDC}",

@@ -18,7 +18,7 @@ from qlinkgen.backends.base import Options
 from qlinkgen.schema import loads
 from tests.support.cdriver import WARNINGS
 
-STRICT = (*WARNINGS, "-Wshadow", "-Wstrict-prototypes", "-std=c99", "-DHOST_ENABLE_FLOAT=1")
+STRICT = (*WARNINGS, "-Wstrict-prototypes", "-std=c99", "-DHOST_ENABLE_FLOAT=1")
 #: Names of the type and of its C type.
 NAMES = {
     "speed": "speed",

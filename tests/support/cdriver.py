@@ -43,7 +43,7 @@ from tests.support.sharing import made_once
 #: Flags under which every generated header must compile without warnings.
 WARNINGS = (
     *("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion"),
-    *("-Wcast-qual", "-Wundef", "-Werror"),
+    *("-Wcast-qual", "-Wshadow", "-Wundef", "-Werror"),
 )
 
 

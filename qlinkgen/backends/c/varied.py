@@ -127,9 +127,9 @@ class Reader:
     def _get(self, step: RecordStep | RecordsStep, value: str, left: list[str]) -> list[str]:
         """Statements that read one record, whose bytes are subtracted from locals."""
         if step.record.payload.walked:
-            lines = ["size_t used = 0U;"]
-            call = f"{self._function}_get_(&{value}, payload, {left[0]}, &used)"
-            used = "used"
+            lines = ["size_t taken = 0U;"]
+            call = f"{self._function}_get_(&{value}, payload, {left[0]}, &taken)"
+            used = "taken"
         else:
             used = f"{step.record.size}U"
             lines = []
