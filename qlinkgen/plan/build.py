@@ -36,7 +36,8 @@ def plan_of(protocol: Protocol, options: Options | None = None) -> Plan:
     messages = select.kept(protocol, options)
     frames = frame_plans(protocol.frame)
     names = {message.name for message in messages}
-    used = select.named(messages)
+    beside = [member.number for frame in frames.values() for member in frame.values.values()]
+    used = select.named(messages, beside)
     return Plan(
         protocol=protocol,
         role=options.role,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -63,11 +64,11 @@ def received_directions(protocol: Protocol, role: Role) -> tuple[Direction, ...]
     return by_role[role]
 
 
-def named(messages: tuple[Message, ...]) -> frozenset[str]:
-    """Names of the enums and flags that the messages use."""
+def named(messages: tuple[Message, ...], beside: Iterable[Scalar]) -> frozenset[str]:
+    """Names of the enums and flags that the messages use, or the values of every frame."""
     fields = [field for message in messages for field in message.fields]
     owners: list[Message | Layout] = [*messages, *layouts_of(fields)]
     types = (value.type for owner in owners for value in owner.values)
-    scalars = (each.item if isinstance(each, Array) else each for each in types)
+    scalars = (each.item if isinstance(each, Array) else each for each in (*types, *beside))
     meanings = (scalar.meaning for scalar in scalars if isinstance(scalar, Scalar))
     return frozenset(each.name for each in meanings if isinstance(each, Enum | Flags))

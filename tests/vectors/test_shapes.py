@@ -32,7 +32,7 @@ from qlinkgen.plan.parts import (
     PayloadPart,
 )
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, SevenBit
-from qlinkgen.schema import loads
+from qlinkgen.schema import find, load, loads
 from tests.c import test_shapes
 from tests.proof import cases
 from tests.proof.outputs import plain_numbers
@@ -217,3 +217,14 @@ def test_a_frame_is_cut_everywhere() -> None:
                 cut = {**whole, "wire": whole["wire"][: 2 * size]}
                 if cut["wire"] not in wrong:
                     decoded(module, plan, message, cut)
+
+
+def test_faults_of_one_command_are_those_of_its_outputs() -> None:
+    """An id that a fault changes may be that of another command, which outputs of one command do not know."""
+    protocol, options = load(find("cobs")), Options(only=("write",))
+    (text,) = vectors.generate(protocol, options).values()
+    module = python.load(protocol, options)
+    for row in json.loads(text)["faults"]:
+        with pytest.raises(module.DecodeError) as caught:
+            getattr(module, f"decode_{row['message'].partition('.')[2]}")(wire(row))
+        assert caught.value.kind == row["kind"]

@@ -205,6 +205,18 @@ commands:
     )
     + "messages:\n  log: {id: 5, fields: {on: bool, n: {type: u8, counts: v, if: on},"
     ' v: {type: "u8[1..3]", if: on}}}\n',
+    "frames of each direction, of which Python could not have one alone": _PARTS.replace(
+        "    data:", "    state: {type: level, if: {direction: response}}\n    data:"
+    )
+    + _BUS
+    + "enums: {level: {type: u8, values: {low: 0, high: 7}}}\n"
+    "defaults: {addressing: node, repeat: safe}\n"
+    "commands:\n  get: {id: 5, request: {}, response: {v: u8}}\n"
+    "  put: {id: 6, request: {v: u8}, response: {}}\n",
+    "records of variable size in records, whose sizes in C had one name": _PARTS
+    + _BUS
+    + 'types: {leaf: {fields: {n: u8, x: "u8[n]"}}, pair: {fields: {a: leaf, b: leaf}}}\n'
+    "messages:\n  log: {id: 5, fields: {v: pair}}\n",
 }
 
 

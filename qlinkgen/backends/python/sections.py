@@ -64,9 +64,7 @@ class Sections:
     def _found(self) -> Mapping[str, Mapping[str, str]]:
         """Definitions for decoding, by direction."""
         return {
-            way: definitions(self._rendered("delimited_search", view))
-            for way, view in self.views.items()
-            if way in self.received
+            way: definitions(self._rendered("delimited_search", view)) for way, view in self.views.items()
         }
 
     @functools.cached_property
@@ -74,7 +72,7 @@ class Sections:
         """The names that are defined for each direction."""
         if not self.directed:
             return Ways(frozenset())
-        return differing([{**made, **self._found.get(way, {})} for way, made in self._made.items()])
+        return differing([{**made, **self._found[way]} for way, made in self._made.items()])
 
     @property
     def frame(self) -> str:
@@ -99,4 +97,5 @@ class Sections:
             return ""
         if not self.directed:
             return self._rendered("delimited_search", view)
-        return merged(self._found, self.ways).strip()
+        received = {way: found for way, found in self._found.items() if way in self.received}
+        return merged(received, self.ways).strip()

@@ -72,8 +72,8 @@ def merged(texts: Mapping[str, Mapping[str, str]], ways: Ways) -> str:
     return whole
 
 
-def _order(first: list[str], other: list[str]) -> list[str]:
-    """The names of both lists, each before those that follow it in either."""
+def _order(first: list[str], other: Sequence[str] = ()) -> list[str]:
+    """The names of both lists, each before those that follow it in either; one role receives from one."""
     found: list[str] = []
     for name in first:
         if name in other:

@@ -36,9 +36,9 @@ _RULES = {"minimum": choice.MINIMUM, "maximum": choice.MAXIMUM, "a5": choice.A5}
 
 def generate(protocol: Protocol, options: Options) -> Outputs:
     """The vectors of a protocol: path below the output folder to text."""
-    vectors = _Vectors(protocol)
-    kept = plan_of(protocol, Options(only=options.only)).messages
-    good = {message.name: vectors.of(message) for message in kept}
+    kept = plan_of(protocol, Options(only=options.only))
+    vectors = _Vectors(protocol, Codec(kept) if options.only else None)
+    good = {message.name: vectors.of(message) for message in kept.messages}
     head: dict[str, Json] = {"about": banner(protocol), "protocol": protocol.name}
     rows = (row for each in good.values() for row in vectors.rows(each))
     text = writer.document(head, {"vectors": rows, "faults": vectors.faults(good.values())})
@@ -48,8 +48,8 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
 class _Vectors:
     """Makes the vectors of one protocol's messages."""
 
-    def __init__(self, protocol: Protocol) -> None:
-        self._protocol = protocol
+    def __init__(self, protocol: Protocol, kept: Codec | None) -> None:
+        self._protocol, self._kept = protocol, kept
         # A response may be selected without its request, which its packet depends on.
         self._codec = Codec(plan_of(protocol))
 
@@ -100,7 +100,7 @@ class _Vectors:
 
     def faults(self, messages: Iterable[Mapping[str, Good]]) -> Iterator[Mapping[str, Json]]:
         """The wrong frames; those of all messages only for the first of each direction and kind of frame."""
-        faults = Faults(self._codec)
+        faults = Faults(self._codec, self._kept)
         begun: set[tuple[Direction, str]] = set()
         for good in messages:
             if good["defaults"].message.asked and not self._codec.plan.is_first(good["defaults"].message):

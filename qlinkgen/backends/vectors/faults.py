@@ -114,9 +114,9 @@ _ALL_CUTS = 512
 class Faults:
     """Makes wrong frames from valid ones."""
 
-    def __init__(self, codec: Codec) -> None:
-        """``codec`` determines the kinds."""
-        self._codec = codec
+    def __init__(self, codec: Codec, kept: Codec | None = None) -> None:
+        """``codec`` determines the kinds; ``kept`` knows only the selected messages, if not all are."""
+        self._codec, self._kept = codec, kept
 
     def of(self, good: Good, *, first: bool) -> Iterator[Bad]:
         """The faults of a message; ``first``: including those that are the same for its direction."""
@@ -127,11 +127,18 @@ class Faults:
             seen.add(wire)
 
     def _kind(self, good: Good, wire: bytes) -> str:
-        try:
-            self._codec.decode(wire, self._codec.plan.direction_of(good.message), good.request)
-        except BadFrame as bad:
-            return bad.kind
-        return ""
+        """The kind of a fault; "" if there is none, or another one where only some messages are known."""
+        kind = _judged(self._codec, good, wire)
+        known = self._kept is None or bool(good.request) or kind == _judged(self._kept, good, wire)
+        return kind if known else ""
+
+
+def _judged(codec: Codec, good: Good, wire: bytes) -> str:
+    try:
+        codec.decode(wire, codec.plan.direction_of(good.message), good.request)
+    except BadFrame as bad:
+        return bad.kind
+    return ""
 
 
 class _Frame:

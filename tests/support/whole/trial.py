@@ -71,7 +71,7 @@ class Effort:
     sanitized: int = 4
     #: C is generated but not compiled.
     uncompiled: bool = False
-    #: Every compiler and standard checks every header, and both C compilers build the kit.
+    #: Every compiler and standard checks every header, both C compilers build the kit, Python has each role.
     every: bool = False
 
 
@@ -199,6 +199,9 @@ class _Trial:
                 self.guard("parse", Path(path).parent.name, partial(_parse, text, path))
         self.targets.append(InterpreterTarget(self.reference, plan_of(protocol)))
         self.guard("load", "python in memory", partial(_load, protocol))
+        some = _selections(protocol)
+        for options in some if self.effort.every else some[self.outcome.seed % len(some) :][:1]:
+            self.guard("load", f"python {options.role} {options.only}", partial(_load, protocol, options))
         if made.keys() >= {"python", "bus"}:
             codec = partial(printed_codec, {**made["python"], **made["bus"]}, self.folder)
             self.guard("load", "python", lambda: self.targets.append(PythonTarget(self.reference, codec())))
@@ -424,8 +427,13 @@ def _header_of(protocol: Protocol, role: Role, folder: Path) -> None:
         (folder / Path(path).name).write_text(text, "utf-8")
 
 
-def _load(protocol: Protocol) -> None:
-    python.load(protocol)
+def _load(protocol: Protocol, options: Options | None = None) -> None:
+    python.load(protocol, options)
+
+
+def _selections(protocol: Protocol) -> Sequence[Options]:
+    """Each role, and one message."""
+    return Options(role="slave"), Options(role="master"), Options(only=(protocol.messages[0].name,))
 
 
 @functools.cache
