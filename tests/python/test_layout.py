@@ -86,6 +86,33 @@ def test_other_protocols_leave_nothing_to_do(path: Path, tmp_path: Path) -> None
     assert ruff("format", "--check", folder=tmp_path) == ""
 
 
+_EQUAL_CASES = """\
+qlinkgen: 1
+protocol: {name: tank, title: Tank, revision: "1", source: Example, doc: A tank}
+byteorder: big
+types: {point: {fields: {x: u8}}, line: {fields: {y: u16}}}
+frame:
+  parts:
+    start: {role: constant, value: 7E}
+    code: {role: message, type: u8}
+    length: {role: length, type: u8, counts: [data]}
+    data: {role: payload, size: 0..40}
+bus: {kind: master_slave}
+messages:
+  log: {id: 5, fields: {k: u8, v: {switch: k, cases: {0: point, 2..3: point, 5: line}, default: line}}}
+  note: {id: 6, fields: {k: u8, v: {switch: k, cases: {0: line, 2..3: point}, default: point}}}
+  stop: {id: 7, fields: {k: u8, v: {switch: k, cases: {0: point, 2: line, 4..5: line}, default: {}}}}
+"""
+
+
+def test_cases_with_equal_records_are_one_branch(tmp_path: Path) -> None:
+    path = tmp_path / "tank.yaml"
+    path.write_text(_EQUAL_CASES, "utf-8")
+    assert place(tmp_path / "out", written(schema.load(path)))
+    assert ruff("check", folder=tmp_path) == ""
+    assert ruff("format", "--check", folder=tmp_path) == ""
+
+
 def test_ruff_detects_unformatted_code(tmp_path: Path) -> None:
     (tmp_path / "long.py").write_text("import os\n\n\nx = [\n  1]\n", "utf-8")
     assert "F401" in ruff("check", folder=tmp_path)

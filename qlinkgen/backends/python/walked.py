@@ -257,11 +257,18 @@ class WalkedDecoder(Decoder):
         return self._cases(cases)
 
     def _cases(self, cases: Sequence[Segment]) -> list[str]:
-        lines, word = list[str](), "if"
+        found: list[tuple[list[str], list[str]]] = []
         for segment in cases:
             assert segment.presence is not None
             test = condition([_python(each) for each in segment.presence.when], "message.{}")
-            lines += [f"{word} {test}:", *indented(self._segment(segment))]
+            body = self._segment(segment)
+            if found and found[-1][1] == body:
+                found[-1][0].append(test)
+            else:
+                found.append(([test], body))
+        lines, word = list[str](), "if"
+        for tests, body in found:
+            lines += [f"{word} {' or '.join(tests)}:", *indented(body)]
             word = "elif"
         return [*lines, "else:", f"    message.{held(cases[0].steps[0])} = None"]
 
