@@ -43,7 +43,8 @@ class ConditionBuilder:
         for field in () if self._separated else found:
             self._check(field, found)
             if any(each.conditional or each.walked for each in found) and _is_packed_run(field):
-                what = f"{field.name} is packed and of variable size, beside fields whose place varies"
+                name = field.slot or field.name
+                what = f"{name} is packed and of variable size, beside fields whose place varies"
                 hint = "give it a fixed number of items"
                 self._report.error(_RULE, (*self._path, field.name), what, hint, of_key=True)
         return found

@@ -223,15 +223,18 @@ class FieldBuilder:
         counts = [(*path, field.name) for field in fields if isinstance(field.type, Scalar)]
         for field in fields:
             if field.open and _is_row(field.type):
-                what = f"the size of the payload does not tell the number of items of {field.name}"
-                hint = f"add a field with counts: {field.name} before it, or use a fixed number"
+                name = field.slot or field.name
+                what = f"the size of the payload does not tell the number of items of {name}"
+                hint = f"add a field with counts: {name} before it, or use a fixed number"
+                hint = "use a fixed number" if field.slot else hint
                 place = (*path, field.name)
                 self._report.error("bad-count", place, what, hint, of_key=True, needs=(place, *counts))
                 self._report.taint(place)
         ended = next((field for field in fields if field.terminated), None)
         for field in fields if ended else ():
             if _is_row(field.type) and not field.fixed:
-                what = f"{field.name} is packed and of variable size, beside a text with a terminator"
+                name = field.slot or field.name
+                what = f"{name} is packed and of variable size, beside a text with a terminator"
                 hint, place = "give it a fixed number of items", (*path, field.name)
                 self._report.error("bad-terminated", place, what, hint, of_key=True, needs=(place, path))
 

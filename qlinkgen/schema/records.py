@@ -133,7 +133,7 @@ class RecordBuilder:
         for field in layout.fields:
             place = (*path, "fields", field.name)
             if isinstance(field.type, Array) and field.type.packed and not field.type.length.fixed:
-                what = f"{field.name} is packed and of variable size, in a record"
+                what = f"{field.slot or field.name} is packed and of variable size, in a record"
                 self._report.error("bad-record", place, what, "give it a fixed number of items", of_key=True)
             if field.optional:
                 what = (

@@ -83,12 +83,15 @@ class ScalarBuilder:
         self._file = file
         self._enums = enums
         self._flags = flags
+        #: Whether groups can make up for a width of no whole bytes.
+        self._grouped = True
         #: Names of types in use.
         self.used: set[str] = set()
 
     def in_bytes(self, file: SchemaFile) -> ScalarBuilder:
-        """The same for a file without groups."""
+        """The same for parts of a frame, in a file without groups."""
         found = ScalarBuilder(file, self._enums, self._flags)
+        found._grouped = False
         found.used = self.used
         return found
 
@@ -218,6 +221,7 @@ class ScalarBuilder:
             return group_chunks(parts, groups.bits, least_first=groups.first == "least")
         if bits % 8:
             hint = "use u8, u16, u24 ... u128, bits inside an integer, or groups"
+            hint = hint if self._grouped else "use u8, u16, u24 ... u128, or bits inside an integer"
             location.fault("bad-width", "type", f"{base} has {bits} bits, not whole bytes", hint)
             return None
         if spec.parts:

@@ -110,9 +110,10 @@ class _Rewriter:
             spec = self._checked(spec, case.path)
             of = CaseOf(slot, case.name, None if choice.default is not None else named)
             found[name] = _with_facts(spec, choice).as_case(of, case.test)
-            self._report.move((*path, name), place)
-            for key in ("if", "type"):
-                self._report.move((*path, name, key), case.path)
+            self._report.move((*path, name), case.path)
+            self._report.move((*path, name, "if"), case.path)
+            for key in choice.model_fields_set - spec.model_fields_set - {"default"}:
+                self._report.move((*path, name, key), (*place, key))
         if not found:
             what = f"no case of {slot} has a value"
             self._report.error(_RULE, place, what, "give one of them a type, or remove it", of_key=True)

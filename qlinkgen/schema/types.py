@@ -80,8 +80,6 @@ class TypeBuilder:
 
     def in_bytes(self) -> TypeBuilder:
         """The same types for parts of a frame, which `groups` of the file does not apply to."""
-        if self._file.groups is None:
-            return self
         found, file = copy(self), self._file.model_copy(update={"groups": None})
         found._file, found._scalars = file, self._scalars.in_bytes(file)  # noqa: SLF001 - of the same class
         return found
