@@ -125,7 +125,7 @@ class CommandBuilder:
             own = {step.message.name: step.message for step in steps if step.message.command == name}
             self.messages += [message for message in own.values() if message.name not in known]
         replies = self._other_replies(name, response, addressing)
-        many = self._many(spec, request, response, replies, path)
+        many = self._many(spec, request, response, replies, path, addressing=addressing)
         self.commands.append(
             Command(
                 name=name,
@@ -164,6 +164,8 @@ class CommandBuilder:
         response: Message | None,
         replies: tuple[Reply, ...],
         path: Path,
+        *,
+        addressing: Addressing,
     ) -> Many | None:
         place = (*path, "many")
         if spec.many is None or spec.steps is not None:
@@ -176,9 +178,10 @@ class CommandBuilder:
             )
             self._report.error("bad-many", place, what, "remove it", of_key=True, needs=needs)
             return None
-        return ManyBuilder(request, response, replies, self._report, address=self._address_name).build(
-            spec.many, place
+        builder = ManyBuilder(
+            request, response, replies, self._report, address=self._address_name, addressing=addressing
         )
+        return builder.build(spec.many, place)
 
     @property
     def _address_name(self) -> str:

@@ -6,7 +6,17 @@ from collections.abc import Iterable, Mapping
 
 from qlinkgen.model.fields import Field, FieldType, Records, values_of
 from qlinkgen.model.message import Message
-from qlinkgen.model.transaction import Allowance, ByCount, ByEach, ByField, ByReply, ByTime, Many, Reply
+from qlinkgen.model.transaction import (
+    Addressing,
+    Allowance,
+    ByCount,
+    ByEach,
+    ByField,
+    ByReply,
+    ByTime,
+    Many,
+    Reply,
+)
 from qlinkgen.model.types import Array, Blob, Enum, Scalar
 from qlinkgen.schema.file_commands import ManySpec
 from qlinkgen.schema.notation import shown, whole_range
@@ -20,7 +30,14 @@ class ManyBuilder:
     """Builds the end of the answers of one command."""
 
     def __init__(
-        self, request: Message, response: Message, replies: Iterable[Reply], report: Reporter, *, address: str
+        self,
+        request: Message,
+        response: Message,
+        replies: Iterable[Reply],
+        report: Reporter,
+        *,
+        address: str,
+        addressing: Addressing,
     ) -> None:
         """The end may refer to each of these messages, and to the part with the address, "" without one."""
         self._request = request
@@ -28,6 +45,7 @@ class ManyBuilder:
         self._replies = {reply.name: reply.message for reply in replies}
         self._report = report
         self._address = address
+        self._addressing = addressing
 
     def build(self, spec: ManySpec, path: Path) -> Many | None:
         """The end that a command states, None if it is wrong."""
@@ -89,6 +107,10 @@ class ManyBuilder:
             return None
         if by is not None and by != self._address:
             return ByEach(name, most, key, by) if self._number(by, self._response, "response", path) else None
+        if self._addressing != "answered_broadcast":
+            what = "only the node that was asked answers, whatever the list says"
+            self._error(path, what, "write addressing: answered_broadcast, or by: FIELD of the response")
+            return None
         return ByEach(name, most, key)
 
     def _reply(self, name: str, path: Path) -> Many | None:
@@ -111,15 +133,25 @@ class ManyBuilder:
         if value in named:
             return ByField(name, named[str(value)], named[str(value)])
         try:
-            return ByField(name, *whole_range(value))
+            first, last = whole_range(value)
         except ValueError:
             hint = did_you_mean(str(value), named, "write a number, a range or a name")
             self._error((*path, name), f"{shown(value)} is not a value of {name}", hint)
             return None
+        if last < kind.minimum or first > kind.maximum:
+            what = f"{name} is never {value}, so the answers have no end"
+            self._error((*path, name), what, f"use {kind.minimum}..{kind.maximum}")
+            return None
+        return ByField(name, first, last)
 
     def _number(self, name: str, message: Message, where: str, path: Path) -> Scalar | None:
         known = {value.name: value.type for value in message.values}
         kind = known.get(name)
+        absent = {value.name for value in values_of(each for each in message.fields if each.conditional)}
+        if name in absent:
+            what = f"{name} of the {where} may be absent"
+            self._error(path, what, "name a field that is always present")
+            return None
         if (
             isinstance(kind, Scalar)
             and kind.scaling is None

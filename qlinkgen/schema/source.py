@@ -153,7 +153,12 @@ def _depth_fault(at: yaml.Event | yaml.Node) -> SyntaxFault:
 def _marked(error: yaml.MarkedYAMLError) -> SyntaxFault:
     mark = error.problem_mark or error.context_mark
     position = Position(mark.line + 1, mark.column + 1) if mark else Position(1, 1)
-    return SyntaxFault("yaml-syntax", position, error.problem or "this is not YAML", _syntax_hint(error))
+    what = "a second document begins" if _another(error) else error.problem or "this is not YAML"
+    return SyntaxFault("yaml-syntax", position, what, _syntax_hint(error))
+
+
+def _another(error: yaml.MarkedYAMLError) -> bool:
+    return "another document" in (error.problem or "")
 
 
 def _syntax_hint(error: yaml.MarkedYAMLError) -> str:
@@ -162,6 +167,8 @@ def _syntax_hint(error: yaml.MarkedYAMLError) -> str:
         return "indent with spaces, not tabs; put text that begins with a special character in quotes"
     if "mapping values are not allowed" in problem:
         return "put text that contains ': ' in quotes"
+    if _another(error):
+        return "write one file for each, and no --- between keys"
     if "could not find expected ':'" in problem:
         return "write a colon and a space after the key"
     return f"it was read {error.context}" if error.context else "check the text before it"
