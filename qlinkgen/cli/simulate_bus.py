@@ -11,6 +11,7 @@ from qlinkgen.cli.simulating import run_bus, say
 from qlinkgen.cli.wire_options import counted, parse_nodes, with_crc
 from qlinkgen.link.codec import Codec
 from qlinkgen.link.slave import Node, SlaveEngine
+from qlinkgen.plan import plan_of
 from qlinkgen.protocols.qlink.facts import NODES
 from qlinkgen.sim import FaultPlan, Wire
 
@@ -58,10 +59,11 @@ def _nodes(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, list[N
     if protocol.bus.nodes is None or protocol.address_name is None:
         if nodes is not None:
             raise Failure(f"the frames of {protocol.name} have no address; omit --nodes {nodes}")
-        return codec, [GenericNode(codec)]
+        return codec, [GenericNode(codec, plan=plan_of(protocol))]
     first, last = protocol.bus.nodes
     numbers = parse_nodes(str(first) if nodes is None else nodes, first, last)
-    return codec, [GenericNode(codec, number) for number in numbers]
+    plan = plan_of(protocol)
+    return codec, [GenericNode(codec, number, plan) for number in numbers]
 
 
 def _qlink_nodes(numbers: Iterable[int]) -> list[Node]:

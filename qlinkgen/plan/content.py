@@ -231,6 +231,21 @@ def defaults(plan: PayloadPlan) -> dict[str, Raw]:
     return by_value(plan, {each.name: default_of(each) for each in plan.settable})
 
 
+def with_decided(plan: PayloadPlan, values: Mapping[str, Raw]) -> dict[str, Raw]:
+    """These values, and the defaults of all other fields that are present with them."""
+    numbers = {name: value for name, value in {**defaults(plan), **values}.items() if isinstance(value, int)}
+    found: dict[str, Raw] = {}
+    for each in plan.settable:
+        presence, name = each.presence, value_name(each)
+        if presence is None or presence.optional:
+            found[name] = default_of(each)
+        elif present(presence, numbers, 0):
+            found[name] = default_of(replace(each, presence=None))
+        else:
+            found.setdefault(name, None)
+    return {**found, **values}
+
+
 def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) -> bytes:  # noqa: C901  # a case a step
     match step:
         case ValueStep():

@@ -6,9 +6,13 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from qlinkgen.link.codec import Codec, Command, Framed, Many, Message
+from qlinkgen.link.asked import answer_to
+from qlinkgen.link.codec import Codec, Command, Framed, Many, Message, is_message
 from qlinkgen.link.many import nodes_asked
 from qlinkgen.link.slave_dialogue import Handling
+from qlinkgen.plan import Plan
+from qlinkgen.plan.codec import Codec as Interpreter
+from qlinkgen.plan.content import with_decided
 
 #: Name of a rule class of a generated module to its smallest legal value.
 _SMALLEST: Mapping[str, Callable[[Any], object]] = {  # Any: a rule of the module's own, of the class named
@@ -38,10 +42,15 @@ class GenericNode:
         requests: number of requests.
     """
 
-    def __init__(self, codec: Codec, number: int = 0) -> None:
-        """Make a node of a generated module."""
+    def __init__(self, codec: Codec, number: int = 0, plan: Plan | None = None) -> None:
+        """Make a node of a generated module.
+
+        ``plan`` of the same protocol gives the defaults of fields that echoed ones decide.
+        """
         self.number = number
         self.requests = 0
+        self._codec = codec
+        self._interpreter = Interpreter(plan) if plan else None
         self._commands = {command.request: command for command in codec.COMMANDS.values()}
         self._required = {
             command.response: required_values(command.response)
@@ -108,7 +117,24 @@ class GenericNode:
         if address := kind.ADDRESS:
             values[address] = self.number
         make: Callable[..., Message] = kind
-        return make(**values)
+        message = make(**values)
+        return self._settled(self._interpreter, message, request) if self._interpreter else message
+
+    def _settled(self, interpreter: Interpreter, message: Message, request: Framed) -> Message:
+        """Return an answer in which the fields that echoed values decide have their defaults."""
+        plan = interpreter.plan.message(message.NAME)
+        deciding = {test.value for field in plan.message.fields for test in field.when}
+        if not deciding.intersection(plan.message.echoes):
+            return message
+        asked = self._codec.encode(request)
+        decoded = interpreter.decode(asked, "request")
+        values = {**decoded.beside, **decoded.values}
+        settled = with_decided(plan.payload, {name: values[name] for name in plan.message.echoes})
+        address = self.number if message.ADDRESS else None
+        wire = interpreter.encode(message.NAME, settled, address, asked)
+        (heard,) = filter(is_message, self._codec.StreamDecoder("response").feed(wire))
+        told = answer_to(self._codec)
+        return told(request, heard) if told else heard
 
 
 def _items(message: type[Message], name: str, count: int) -> dict[str, object]:

@@ -11,6 +11,7 @@ from qlinkgen.backends.python import load
 from qlinkgen.link import MasterEngine, Timing
 from qlinkgen.link.codec import address_of, answers
 from qlinkgen.link.slave import SlaveEngine
+from qlinkgen.plan import plan_of
 from qlinkgen.schema import load as load_schema
 from qlinkgen.schema import loads
 from qlinkgen.sim import VirtualPort, Wire
@@ -84,6 +85,49 @@ def test_a_master_gets_several_answers() -> None:
         given = {"number": 3} if name == "some" else {}
         counts[name] = len(master.transact(command.request(**given)).response)
     assert counts == {"pair": 2, "some": 3, "list": 1, "dump": 1, "scan": 1}
+
+
+DECIDED = """\
+qlinkgen: 1
+protocol: {name: heater, title: Heater, revision: "1", source: Manual}
+frame:
+  parts:
+    code: {role: message, type: u8}
+    length: {type: u8, counts: [data]}
+    number: {role: counter, type: u8, echo: true}
+    data: {role: payload, size: 0..8}
+    crc: {type: u16, algorithm: crc-16/modbus, over: [code, length, data]}
+bus: {kind: master_slave, response_within: 10 ms}
+defaults: {repeat: safe}
+commands:
+  heat:
+    id: 1
+    request: {class: u8}
+    response: {class: {type: u8, echo: true}, delay: {type: u16, if: {class: 2}}}
+  read:
+    id: 2
+    request: {mode: u8}
+    response:
+      mode: {type: u8, echo: true}
+      value:
+        switch: mode
+        cases: {0: {}, 1: {type: u16, range: 5..9}, 2: {first: u8, last: u8}}
+        default: "bytes[1..4]"
+"""
+
+
+def test_fields_that_repeated_values_decide() -> None:
+    protocol, faults = loads(DECIDED, "heater.yaml")
+    assert protocol is not None, faults
+    codec = load(protocol)
+    node = GenericNode(codec, plan=plan_of(protocol))
+    found: dict[str, list[str]] = {}
+    for name, command in codec.COMMANDS.items():
+        (key,) = command.request.FIELDS
+        answered = [node.handle(command.request(**{key: number}), 0.0) for number in range(4)]
+        found[name] = [codec.encode(each)[3:-2].hex() for each in answered]
+    assert found["heat"] == ["00", "01", "020000", "03"]
+    assert found["read"] == ["00", "010005", "020000", "0300"]
 
 
 def test_what_it_repeats() -> None:
