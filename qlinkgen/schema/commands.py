@@ -53,6 +53,10 @@ def _allowance(time: Duration | None) -> Allowance:
     return Allowance(time.byte_times, time.seconds) if time else Allowance()
 
 
+#: The hint where a reply has the id of its response.
+_ONE_ANSWER = "; or make one response of both, with if or switch for their fields, and with means"
+
+
 class CommandBuilder:
     """Builds the messages and commands of one file."""
 
@@ -397,6 +401,8 @@ class CommandBuilder:
                     what = f"{self._called(message)} has the id of {self._called(other)}, {message.id:#04x}"
                     needs = (path, self._build.id_places[other.name])
                     hint = "use another id"
+                    if message.command and message.direction == other.direction == "response":
+                        hint += _ONE_ANSWER if message.command == other.command else ""
                     if message.name in answers and other.name in answers:
                         hint += (
                             "; a number of all answers is stated once, in defaults: {response: {id: 0x55}}"

@@ -58,6 +58,8 @@ def build_length(text: TypeText, item_bits: int, payload_max: int, location: Loc
         first, last = whole_range(text.count)
     except ValueError:
         hint = "write a number or a range, like [4] or [0..12]"
+        if text.count.strip().startswith("request."):
+            hint += "; only fields that a response lists itself have sizes from the request"
         location.fault("unknown-type", "type", f"{shown(text.count)} is not a count", hint)
         return None
     if last == 0:

@@ -15,6 +15,8 @@ from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
 _RULE = "bad-condition"
+#: The hint where no field comes before.
+_OWN = "name a field of the same message that comes before it"
 
 
 class ConditionBuilder:
@@ -80,7 +82,8 @@ class ConditionBuilder:
         owner, _, bit = text.field.partition(".")
         value = values.get(bit or owner)
         if value is None or (bit and value.field.name != owner):
-            hint = did_you_mean(text.field, values, f"earlier fields with a value: {listed(values)}")
+            known = f"earlier fields with a value: {listed(values)}" if values else _OWN
+            hint = did_you_mean(text.field, values, known)
             what = f"{field.slot or field.name} has no field {shown(text.field)} with a value before it"
             self._error(field.name, key, what, hint)
             return None
@@ -182,7 +185,10 @@ class ConditionBuilder:
         if not field.optional and (later := next(crossing, None)):
             name = field.slot or field.name
             what = f"{name} takes the rest of the payload, but {later.name} after it may be absent"
-            self._error(later.name, "optional" if later.optional else "if", what, f"give {name} a count")
+            hint = f"give {name} a count"
+            if later.when and later.when == field.when and not field.slot:
+                hint += ", or put both into a record that has the if, or into a case of a switch"
+            self._error(later.name, "optional" if later.optional else "if", what, hint)
 
     def _check_optional(self, field: Field, after: Sequence[Field]) -> None:
         if field.when:

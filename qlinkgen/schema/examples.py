@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from qlinkgen.plan.payload import Holder
 
 _RULE = "wrong-example"
+#: Kinds of faults of a frame in words.
+_WRONG = {"crc": "its check value is not that of its bytes"}
 
 
 def build_examples(file: SchemaFile, protocol: Protocol, report: Reporter) -> tuple[Example, ...]:
@@ -111,11 +113,17 @@ class _Checker:
         try:
             decoded = self._codec.decode(spec.wire, direction, spec.after)
         except BadFrame as bad:
-            what = f"this is not a frame of {message.name}: {bad.kind} at byte {bad.end}"
+            why = _WRONG.get(bad.kind, f"{bad.kind} at byte {bad.end}")
+            what = f"this is not a frame of {message.name}: {why}"
             hint = f"`qlinkgen explain {self._protocol.schema_file} {spec.wire.hex()}` describes every byte"
             self._error(place, what, hint)
             return None
         found = decoded.message.name
+        if found != message.name and decoded.message.message.carries and not spec.after:
+            self._error(
+                path, "only its request tells what this frame is", "add after: the bytes of the request"
+            )
+            return None
         if found != message.name:
             self._error(place, f"this is a frame of {found}", f"move the example to {found}")
             return None

@@ -106,7 +106,10 @@ class AnswerSpec(FileMapping):
 
 
 def _is_long(value: Mapping[str, object]) -> bool:
-    """Whether a response has the long form: only its keys, and values that no field has."""
+    """Whether a response has the long form: its fields, or only its keys, and values that no field has."""
+    fields = value.get("fields")
+    if isinstance(fields, dict) and not fields.keys() & {"type", "switch"}:
+        return True
     if not value or not value.keys() <= AnswerSpec.model_fields.keys():
         return False
     if "fields" in value:

@@ -8,7 +8,7 @@ are suppressed.
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import get_args
 
 from pydantic import BaseModel, ValidationError
@@ -195,24 +195,31 @@ def _at(data: Data, path: Path) -> Data:
 def _model_at(path: Path) -> type[BaseModel] | None:
     """The class of the mapping at a path."""
     here: object = SchemaFile
-    for step in path:
+    for step, below in zip(path, (*path, None)[1:], strict=True):
         if isinstance(here, type) and issubclass(here, BaseModel):
             field = here.model_fields.get(str(step))
             here = field.annotation if field else None
         else:
             here = next((part for part in reversed(get_args(here)) if part is not str), None)
-        here = _mapping_type(here)
+        here = _mapping_type(here, below)
     return here if isinstance(here, type) and issubclass(here, BaseModel) else None
 
 
-def _mapping_type(annotation: object) -> object:
-    """The mapping or list inside an annotation."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    if getattr(annotation, "__origin__", None) in (dict, list):
-        return annotation
-    found = (_mapping_type(part) for part in get_args(annotation))
-    return next((each for each in found if each is not None), None)
+def _mapping_type(annotation: object, below: int | str | None) -> object:
+    """The mapping or list inside an annotation; of several, the class that has the key ``below``."""
+    found = list(_mapping_types(annotation))
+    classes = [each for each in found if isinstance(each, type) and issubclass(each, BaseModel)]
+    fitting = (each for each in classes if below is None or str(below) in each.model_fields)
+    return next(fitting, found[0] if found else None)
+
+
+def _mapping_types(annotation: object) -> Iterator[object]:
+    is_class = isinstance(annotation, type) and issubclass(annotation, BaseModel)
+    if is_class or getattr(annotation, "__origin__", None) in (dict, list):
+        yield annotation
+    else:
+        for part in get_args(annotation):
+            yield from _mapping_types(part)
 
 
 def _is_field(path: Path) -> bool:

@@ -52,6 +52,8 @@ _KEYS: dict[str, tuple[tuple[str, str], ...]] = {
     "members": (("values", "{one: 1}"),),
     "structs": (("types", "{name: {type: u8}}"),),
     "fields": (("request", "{name: u8}"),),
+    "const": (("range", "the number, and default: the number"),),
+    "switch": (("fields", "{kind: u8, value: {switch: kind, cases: {..}}}; a record holds a choice"),),
     "payload": (("request", "{name: u8}"),),
     "reply": (("response", "{name: u8}"),),
     "answer": (("response", "{name: u8}"),),
