@@ -45,6 +45,9 @@ class CodingBuilder:
         """The codings in order, the names of coded parts, and whether check values cover coded bytes."""
         if spec is None:
             return (), (), False
+        if spec == []:
+            self._error(_PATH, "the list of codings is empty", "write at least one, or remove the key")
+            return (), (), False
         many = isinstance(spec, list)
         specs = spec if isinstance(spec, list) else [spec]
         if not self._known:

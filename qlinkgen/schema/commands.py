@@ -23,7 +23,7 @@ from qlinkgen.schema.notation import AnswerId, Duration, StatedId, shown
 from qlinkgen.schema.replies import ReplyBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.seeds import is_number
-from qlinkgen.schema.sides import asker_of, check_sides
+from qlinkgen.schema.sides import EITHER, asker_of, check_sides
 from qlinkgen.schema.sizes import sized
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.steps import Asked, StepBuilder, names_response
@@ -37,6 +37,10 @@ def build_bus(file: SchemaFile, report: Reporter) -> Bus:
         if spec.kind == "link":
             what, hint = "both sides of the link have the same name", "use different names"
         report.error("bad-link", ("bus", "sides"), what, hint, of_key=True)
+    for index, side in enumerate(spec.sides or ()):
+        if side == EITHER:
+            what = f"from: {EITHER} of a command means both sides, not one called so"
+            report.error("bad-link", ("bus", "sides", index), what, "use another name")
     return Bus(
         kind=spec.kind,
         nodes=spec.nodes,

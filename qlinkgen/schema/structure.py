@@ -148,6 +148,9 @@ def _explained(kind: str, seen: object, detail: ErrorDetails) -> tuple[str, str,
         return "bad-value", f"{shown(seen)} is too small", f"use {context['ge']} or more"
     if kind == "less_than_equal":
         return "bad-value", f"{shown(seen)} is too large", f"use {context['le']} or less"
+    if kind in {"too_short", "too_long"} and context["actual_length"]:
+        wanted = context["max_length" if kind == "too_long" else "min_length"]
+        return "bad-value", f"the number of its entries is {context['actual_length']}", f"write {wanted}"
     if kind == "too_short":
         return (
             "bad-value",
