@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 import platform
-from collections.abc import Callable, Mapping
 from typing import Any
 from unittest import mock
 
@@ -14,9 +12,8 @@ from tests.library.protocols import Record
 # What it imports would start a program to learn how wide pointers are.
 with mock.patch.object(platform, "architecture", return_value=("64bit", "")):
     import meterbus
-    from meterbus.core_objects import DataEncoding
 
-#: It reads the records of answers alone, and builds none.
+#: It neither builds nor reads what is written to a meter.
 UNKNOWN: frozenset[str] = frozenset()
 
 
@@ -75,54 +72,5 @@ def read(wire: bytes, direction: Direction) -> Record | None:
             "medium": kind.measure_medium_field.parts[0],
             "access": kind.acc_nr_field.parts[0],
             "status": kind.status_field.parts[0],
-            **_records(found.body.bodyPayload),
         },
     }
-
-
-def _records(payload: Any) -> Record:
-    """The records that it reads; nothing if it leaves some out, which are those without a value."""
-    if b"" in (values := [bytes(each.dataField.parts) for each in payload.records]):
-        return {}
-    described = sum(len(each.dib) + len(each.vib) + _text_size(each) for each in payload.records)
-    if described + sum(map(len, values)) != len(payload.body):
-        return {}
-    return {"records": [_record(each) for each in payload.records]}
-
-
-def _text_size(record: Any) -> int:
-    """Bytes of the unit as text, and of the sizes of texts."""
-    custom = record.vib.customVIF
-    return int(record.vib.without_extension_bit) * (1 + len(custom)) + int(record.dib.is_variable_length)
-
-
-def _record(record: Any) -> Record:
-    dib, vib, data = record.dib, record.vib, record.dataField
-    readers: Mapping[Any, Callable[[], object]] = {
-        DataEncoding.ENCODING_INTEGER: lambda: data.decodeInt,
-        DataEncoding.ENCODING_BCD: lambda: data.decodeBCD,
-        DataEncoding.ENCODING_REAL: lambda: _number(data.decodeReal),
-        DataEncoding.ENCODING_VARIABLE_LENGTH: lambda: {"text": data.decodeASCII[::-1]},
-    }
-    return {
-        "length": dib.parts[0] & dib.DATA_FIELD_MASK,
-        "function": ("instantaneous", "maximum", "minimum", "error")[dib.function_type.value],
-        "storage": bool(dib.parts[0] & dib.STORAGE_NUMBER_MASK),
-        "described": len(dib) > 1,
-        "dife": _extensions(dib),
-        "code": vib.parts[0] & 0x7F,
-        "extended": len(vib) > 1,
-        "unit": vib.customVIF.decodeASCII[::-1] if vib.without_extension_bit else None,
-        "vife": _extensions(vib),
-        "value": readers[dib.length_encoding[1]](),
-    }
-
-
-def _number(number: float) -> float | str:
-    """As JSON has it."""
-    return number if math.isfinite(number) else str(number)
-
-
-def _extensions(block: Any) -> list[Record] | None:
-    found: list[Record] = [{"value": each & 0x7F, "more": each >= 0x80} for each in block.parts[1:]]
-    return found or None
