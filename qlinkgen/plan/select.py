@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 from qlinkgen.model.fields import Layout, layouts_of
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.transaction import ByReply, Command
 from qlinkgen.model.types import Array, Enum, Flags, Scalar
 
 Role = Literal["both", "master", "slave"]
@@ -35,11 +36,17 @@ class Options:
 def kept(protocol: Protocol, options: Options) -> tuple[Message, ...]:
     """The selected messages, in schema order."""
     wanted = set(options.only)
-    commands = [command for command in protocol.commands if command.name in wanted]
+    commands = [command for command in protocol.commands if command.name in wanted or _asks(command, wanted)]
     wanted |= {message.name for command in commands for message in command.messages}
     if any(protocol.is_asked(m) and m.name in wanted for m in protocol.messages):
         wanted |= {message.name for message in protocol.messages if message.carries}
     return tuple(m for m in protocol.messages if not wanted or {m.name, m.command} & wanted)
+
+
+def _asks(command: Command, wanted: Collection[str]) -> bool:
+    """Whether only its request is selected, but a master cannot send it without knowing what follows."""
+    follows = bool(command.steps) or isinstance(command.many, ByReply)
+    return follows and command.request.name in wanted
 
 
 def encoded(message: Message, role: Role) -> bool:

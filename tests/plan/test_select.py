@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from qlinkgen.backends import python
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.select import Options
 from qlinkgen.schema import loads
@@ -49,3 +50,21 @@ def test_enums_and_flags_are_kept_with_their_messages(
     assert protocol is not None
     plan = plan_of(protocol, Options(only=only))
     assert ([each.name for each in plan.enums], [each.name for each in plan.flags]) == (enums, flags)
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        "replies: {end: {id: 4, fields: {}}}, many: {until: end}",
+        "steps: [{receive: {id: 4, fields: {}}}, {send: {id: 5, fields: {}}}, {receive: response}]",
+    ],
+    ids=["answers up to a reply", "steps"],
+)
+def test_a_request_is_kept_with_all_that_its_master_must_know(more: str) -> None:
+    text = f"{_SCHEMA}  log: {{id: 3, request: {{}}, response: {{s: u8}}, {more}}}\n"
+    protocol, faults = loads(text, "choice.yaml")
+    assert protocol is not None, faults
+    assert python.load(protocol, Options(only=("log.request",))).COMMANDS.keys() == {"log"}
+    request, command = (plan_of(protocol, Options(only=(name,))).messages for name in ("log.request", "log"))
+    assert request == command
+    assert len(command) > 1
