@@ -142,6 +142,11 @@ class Command(Protocol):
         ...
 
     @property
+    def sized_by(self) -> type[Framed]:
+        """Class of the frame that has the sizes of the response, which is the request or a step."""
+        ...
+
+    @property
     def many(self) -> Many | None:
         """The end of several answers, None if there is one."""
         ...
@@ -259,30 +264,47 @@ def meanings(reply: OtherReply) -> set[str]:
     return {reply.means, *(means for _, _, means in reply.cases)}
 
 
-def wrong_size(command: Command, request: Message, response: Message, *, received: bool = True) -> str:
-    """Return the first field of a response with another number of items than the request says, "" if none.
+def wrong_size(command: Command, asked: Message, response: Message, *, received: bool = True) -> str:
+    """Return the first field of a response with another number of items than a frame says, "" if none.
 
+    ``asked`` is the last frame that may say it: others say nothing.
     A received row of bits, of which only the bytes are counted, has the number of items that fit them.
     """
-    for name, asked, bits in command.sizes:
-        items, number = len(getattr(response, name)), getattr(request, asked)
+    if type(asked) is not command.sized_by:
+        return ""
+    for name, number_name, bits in command.sizes:
+        items, number = len(getattr(response, name)), getattr(asked, number_name)
         if items != number and not (received and bits and items == 8 * ((bits * number + 7) // 8) // bits):
             return name
     return ""
 
 
-def cut(command: Command, request: Message, response: Message) -> None:
-    """Reduce received rows of bits to the number of items that the request says."""
-    for name, asked, bits in command.sizes if type(response) is command.response else ():
+def cut(command: Command, asked: Message, response: Message) -> None:
+    """Reduce received rows of bits to the number of items that ``asked`` says, as in `wrong_size`."""
+    told = type(response) is command.response and type(asked) is command.sized_by
+    for name, number_name, bits in command.sizes if told else ():
         if bits:
-            setattr(response, name, getattr(response, name)[: getattr(request, asked)])
+            setattr(response, name, getattr(response, name)[: getattr(asked, number_name)])
 
 
-def answers(command: Command, request: Message, response: Message) -> bool:
-    """Whether an answer has a right class for a request, equal echoed fields and the sizes asked for."""
+def missized(response: Message, name: str, command: Command, asked: Message) -> str:
+    """Describe a field of a response with a wrong number of items."""
+    number_name = next(number for field, number, _ in command.sizes if field == name)
+    frame = "the request" if command.sized_by is command.request else asked.NAME
+    return (
+        f"{response.NAME}: {name} has {len(getattr(response, name))} items; "
+        f"{number_name} of {frame} asks for {getattr(asked, number_name)}"
+    )
+
+
+def answers(command: Command, request: Message, asked: Message, response: Message) -> bool:
+    """Whether an answer has a right class for a request, equal echoed fields and the sizes asked for.
+
+    ``asked`` is the frame that may say the sizes, as in `wrong_size`.
+    """
     if type(response) is command.response:
         echoes = command.echoes
-        if command.sizes and wrong_size(command, request, response):
+        if command.sizes and wrong_size(command, asked, response):
             return False
     elif reply := command.replies.get(type(response)):
         echoes = reply.echoes

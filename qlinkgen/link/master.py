@@ -34,6 +34,7 @@ from qlinkgen.link.codec import (
     address_getter,
     cut,
     is_message,
+    missized,
     reason_of,
     wrong_size,
 )
@@ -389,6 +390,8 @@ class MasterEngine:
         if self.numbering is not None:
             self.numbering.number(message)
         frame = self.codec.encode(message)
+        if type(message) is pending.command.definition.sized_by:
+            pending.asked = message
         if self._address(message) != pending.node:
             raise ValueError(f"{message.NAME} is for another node than {pending.request.NAME}")
         self._attempts.patient_until = 0.0
@@ -472,7 +475,7 @@ class MasterEngine:
         reply = pending.replied_by(message, self._address(message))
         if reply is None:
             return self._is_one_of_several(message, now)
-        cut(pending.command.definition, pending.request, message)
+        cut(pending.command.definition, pending.asked, message)
         means = reply.meaning(message)
         if means == "done" and self._dialogue is not None and type(message) is pending.command.response:
             return self._is_step(self._dialogue, message, now)
@@ -517,6 +520,7 @@ class MasterEngine:
         right = pending.answered_by(message, node) if dialogue.is_last_answer else node == pending.node
         if not right:
             return False
+        cut(pending.command.definition, pending.asked, message)
         dialogue.answer(message)
         if dialogue.ended:
             self._succeed(message, now)
@@ -535,7 +539,7 @@ class MasterEngine:
             return False
         if not pending.answered_by(message, self._address(message)) or not answers.expects(message):
             return False
-        cut(pending.command.definition, pending.request, message)
+        cut(pending.command.definition, pending.asked, message)
         if answers.take(message):
             self._succeed(message, now)
             return True
@@ -592,14 +596,10 @@ class MasterEngine:
 
     def _missized(self, message: Framed) -> Fault | None:
         """The fault of a response of another size than the request asks for, None if it has that size."""
-        command, request = self._pending.command.definition, self._pending.request
-        if type(message) is not command.response or not (name := wrong_size(command, request, message)):
+        command, asked = self._pending.command.definition, self._pending.asked
+        if type(message) is not command.response or not (name := wrong_size(command, asked, message)):
             return None
-        asked = next(number for field, number, _ in command.sizes if field == name)
-        text = (
-            f"{message.NAME}: {name} has {len(getattr(message, name))} items; "
-            f"{asked} of the request asks for {getattr(request, asked)}"
-        )
+        text = missized(message, name, command, asked)
         return NotAnAnswer("length", 0, self.codec.encode(message), text)
 
     def _damaged(self, fault: Fault, now: float) -> None:
@@ -617,7 +617,7 @@ class MasterEngine:
         self._state = _ANSWERED[self._state]
         answers = self._answers
         if pending.command.sizes:
-            cut(pending.command.definition, pending.request, response)
+            cut(pending.command.definition, pending.asked, response)
         several: object = response if answers is None else answers.result
         if self._dialogue is not None and self._dialogue.ended:
             several = tuple(self._dialogue.answers)

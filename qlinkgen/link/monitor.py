@@ -71,13 +71,15 @@ class _Pending:
     """The last request, and its deadline."""
 
     __slots__ = (
-        "answered", "answers", "at", "command", "deadline", "dialogue", "reported", "request", "sent",
-        "sent_as",
+        "answered", "answers", "asked", "at", "command", "deadline", "dialogue", "reported", "request",
+        "sent", "sent_as",
     )  # fmt: skip
 
     def __init__(self, command: Command, request: Framed, at: float, deadline: float, *, alone: bool) -> None:
         self.command = command
         self.request = request
+        #: The frame that may say the sizes of the response.
+        self.asked = request
         self.at = at
         self.deadline = deadline
         self.answers = Answers(command.many, request, alone=alone) if command.many is not None else None
@@ -98,6 +100,8 @@ class _Pending:
         if not dialogue.take(request, sent=True):
             return False
         self.at, self.sent, self.sent_as = now, request, before
+        if type(request) is self.command.sized_by:
+            self.asked = request
         return True
 
     def due(self, response: Framed) -> bool:
@@ -233,7 +237,7 @@ class Monitor:
     def _fits(self, pending: _Pending, response: Framed) -> bool:
         if pending.due(response):
             return address_of(response) == address_of(pending.request)
-        if pending.early(response) or not answers(pending.command, pending.request, response):
+        if pending.early(response) or not answers(pending.command, pending.request, pending.asked, response):
             return False
         several = pending.answers if type(response) is pending.command.response else None
         if several is not None and not several.expects(response):
@@ -258,7 +262,7 @@ class Monitor:
             pending.answered = pending.reported = True
         delay = now - pending.at
         frame = self._codec.encode(response)
-        cut(pending.command, pending.request, response)
+        cut(pending.command, pending.asked, response)
         self.heard.append(Replied(now, pending.sent, response, delay, late, frame))
 
     def _further_deadline(self, pending: _Pending, response: Framed, now: float) -> float | None:

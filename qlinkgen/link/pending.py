@@ -12,6 +12,7 @@ class Pending:
 
     Attributes:
         request: the message.
+        asked: the frame that may say the sizes of the response: the request, or a later one of a dialogue.
         command: its command.
         node: address in it, None for frames without one.
         to_all: it is a broadcast.
@@ -19,7 +20,7 @@ class Pending:
         count: counts of the node.
     """
 
-    __slots__ = ("command", "count", "frame", "node", "request", "to_all")
+    __slots__ = ("asked", "command", "count", "frame", "node", "request", "to_all")
 
     def __init__(  # noqa: PLR0917  # made for each transaction, where keywords would take 1 % of the time
         self,
@@ -30,7 +31,7 @@ class Pending:
         count: LinkCounters,
         to_all: bool,
     ) -> None:
-        self.request = request
+        self.request = self.asked = request
         self.command = command
         self.node = node
         self.frame = frame
@@ -49,7 +50,7 @@ class Pending:
         for name in command.echoes:
             if getattr(response, name) != getattr(request, name):
                 return False
-        if command.sizes and wrong_size(command.definition, request, response):
+        if command.sizes and wrong_size(command.definition, self.asked, response):
             return False
         if command.accepts is not None:
             return command.accepts(request, response)
@@ -63,7 +64,7 @@ class Pending:
         if self.command.accepts is not None and type(message) is self.command.response:
             return reply if self.command.accepts(self.request, message) else None
         sizes = self.command.sizes if type(message) is self.command.response else ()
-        if sizes and wrong_size(self.command.definition, self.request, message):
+        if sizes and wrong_size(self.command.definition, self.asked, message):
             return None
         same = all(getattr(message, name) == getattr(self.request, name) for name in reply.echoes)
         return reply if same else None

@@ -13,6 +13,7 @@ from qlinkgen.link.codec import (
     Message,
     address_of,
     is_message,
+    missized,
     wrong_size,
 )
 from qlinkgen.link.echo import EchoCanceller
@@ -137,7 +138,7 @@ class SlaveEngine:
             for each in codec.COMMANDS.values()
             if each.many is not None and hasattr(each.many, "each") and not getattr(each.many, "by", None)
         }
-        self._sized = {command.request: command for command in codec.COMMANDS.values() if command.sizes}
+        self._sized = {command.sized_by: command for command in codec.COMMANDS.values() if command.sizes}
         self._dialogues = {each.request: each for each in codec.COMMANDS.values() if each.steps}
         #: Classes of the frames of masters that are only part of dialogues.
         self._parts = {
@@ -290,7 +291,7 @@ class SlaveEngine:
         several: Sequence[Message] = response if isinstance(response, list | tuple) else (response,)
         asked = request
         if (dialogue := self._dialogue) is not None:
-            asked = dialogue.request
+            asked = dialogue.asked
             dialogue.until = None
             dialogue.check(several)
         for each in several:
@@ -311,11 +312,7 @@ class SlaveEngine:
         if command is None or type(response) is not command.response:
             return
         if name := wrong_size(command, request, response, received=False):
-            asked = next(number for field, number, _ in command.sizes if field == name)
-            raise ValueError(
-                f"{response.NAME}: {name} has {len(getattr(response, name))} items; "
-                f"{asked} of the request asks for {getattr(request, asked)}"
-            )
+            raise ValueError(missized(response, name, command, request))
 
     def _handled(self, request: Framed, now: float) -> Answers:
         try:

@@ -43,11 +43,12 @@ class SlaveDialogue(Progress):
 
     Attributes:
         request: its request.
+        asked: the frame that may say the sizes of the response.
         until: time at which the slave no longer waits for the next frame, None without a limit.
         left: it is over.
     """
 
-    __slots__ = ("_command", "_handling", "_heard_at", "left", "request", "until")
+    __slots__ = ("_command", "_handling", "_heard_at", "asked", "left", "request", "until")
 
     def __init__(self, command: Command, request: Framed, handling: Handling | None) -> None:
         """Without ``handling``, the handler has given all answers to the request at once."""
@@ -55,7 +56,7 @@ class SlaveDialogue(Progress):
         self._command = command
         self._handling = handling
         self._heard_at = 0
-        self.request = request
+        self.request = self.asked = request
         self.until: float | None = None
         self.left = False
 
@@ -71,6 +72,8 @@ class SlaveDialogue(Progress):
         if not self.take(message, sent=True):
             return False
         self._heard_at = before
+        if type(message) is self._command.sized_by:
+            self.asked = message
         self.until = None
         return True
 

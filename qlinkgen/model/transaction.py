@@ -180,8 +180,10 @@ class Command:
     confirmed: bool = True
     #: Answers other than the response.
     replies: tuple[Reply, ...] = ()
-    #: Fields of the response, and the fields of the request that say how many items they have.
+    #: Fields of the response, and the fields of ``sized_by`` that say how many items they have.
     sizes: tuple[tuple[str, str], ...] = ()
+    #: What the master sends that has the latter: the request or a step; None without sizes.
+    sized_by: Message | None = None
     #: The end of the answers, None if there is one.
     many: Many | None = None
     #: The frames after the request; () for a request and its response.

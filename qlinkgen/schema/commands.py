@@ -24,7 +24,7 @@ from qlinkgen.schema.replies import ReplyBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.seeds import is_number
 from qlinkgen.schema.sides import EITHER, asker_of, check_sides
-from qlinkgen.schema.sizes import sized
+from qlinkgen.schema.sizes import Sized, sized
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.steps import Asked, StepBuilder, names_response
 
@@ -74,7 +74,7 @@ class CommandBuilder:
         self._frame = frame
         self._bus = bus
         self._replies = ReplyBuilder(file, report, messages, frame)
-        self._sizes: dict[str, tuple[tuple[str, str], ...]] = {}
+        self._sizes: dict[str, Sized] = {}
         self._singles: dict[str, Message] = {}
         self._replied: set[str] = set()
         self._steps = StepBuilder(file, report, messages, self._singles, self._sizes)
@@ -134,6 +134,7 @@ class CommandBuilder:
             self.messages += [message for message in own.values() if message.name not in known]
         replies = self._other_replies(name, response, addressing)
         many = self._many(spec, request, response, replies, path, addressing=addressing)
+        found = self._sizes.get(name, Sized({}))
         self.commands.append(
             Command(
                 name=name,
@@ -144,7 +145,8 @@ class CommandBuilder:
                 response_within=_allowance(spec.response_within or self._file.bus.response_within),
                 repeat=self._repeat(spec.repeat or defaults.repeat, request, path),
                 replies=replies,
-                sizes=self._sizes.get(name, ()),
+                sizes=found.sizes,
+                sized_by=found.by,
                 many=many,
                 steps=steps,
                 outcome=self._replies.outcome(name, response),
@@ -236,8 +238,8 @@ class CommandBuilder:
             return asked, None
         if isinstance(response, str):
             return asked, self._named_response(response, answers.path)
-        found = sized(answers.fields, asked, answers.path, self._report)
-        self._sizes[name] = found.sizes
+        found = sized(answers.fields, {"request": asked}, answers.path, self._report)
+        self._sizes[name] = found
         sized_answers = answers._replace(fields=found.fields, asked={name for name, _ in found.sizes})
         answered = build(name, spec, sized_answers, addressing=addressing, section=section)
         self.messages.append(answered)

@@ -1,8 +1,9 @@
-"""Second pass, sizes from the request: arrays with as many items as a field of the request says."""
+"""Second pass, sizes of answers: arrays with as many items as a field of an earlier frame says."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from qlinkgen.model.message import Message
@@ -12,7 +13,7 @@ from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
-_FROM_REQUEST = re.compile(r"\A(?P<base>[^\[]*)\[\s*request\.(?P<name>\w+)\s*\]\s*\Z", re.ASCII)
+_FROM_FRAME = re.compile(r"\A(?P<base>[^\[]*)\[\s*(?P<frame>[A-Za-z]\w*)\.(?P<name>\w+)\s*\]\s*\Z", re.ASCII)
 
 
 class Sized(NamedTuple):
@@ -20,42 +21,63 @@ class Sized(NamedTuple):
 
     Attributes:
         fields: each with a range in place of the reference.
-        sizes: fields, and the fields of the request with their number of items.
+        sizes: fields, and the fields with their number of items.
+        by: the frame that has the latter, None without sizes.
     """
 
     fields: Fields
-    sizes: tuple[tuple[str, str], ...]
+    sizes: tuple[tuple[str, str], ...] = ()
+    by: Message | None = None
 
 
-def sized(fields: Fields, request: Message, path: Path, report: Reporter) -> Sized:
-    """Replace ``u16[request.quantity]`` by the range of that field of the request."""
+def sized(fields: Fields, frames: Mapping[str, Message], path: Path, report: Reporter) -> Sized:
+    """Replace ``u16[request.quantity]`` by the range of that field of the request.
+
+    ``frames`` are what the master has sent before: the request, and steps by name.
+    """
     found, sizes = dict(fields), []
+    by = ""
     for name, spec in fields.items():
-        match = _FROM_REQUEST.match(spec.type)
+        match = _FROM_FRAME.match(spec.type)
         if match is None:
             continue
-        bounds = _bounds(match["name"], request, (*path, name), report)
+        place = (*path, name)
+        bounds = _bounds(match["frame"], match["name"], frames, place, report)
+        if bounds and by and by != match["frame"]:
+            what = f"sizes are in two frames, {by} and {match['frame']}"
+            report.error("bad-array", place, what, "put the numbers of items into one frame")
+            report.taint(place)
+            bounds = None
         if bounds is None:
             del found[name]
             continue
+        by = match["frame"]
         found[name] = spec.model_copy(update={"type": f"{match['base']}[{bounds[0]}..{bounds[1]}]"})
         sizes.append((name, match["name"]))
-    return Sized(found, tuple(sizes))
+    return Sized(found, tuple(sizes), frames.get(by))
 
 
-def _bounds(name: str, request: Message, path: Path, report: Reporter) -> tuple[int, int] | None:
-    known = {value.name: value.type for value in request.values}
+def _bounds(
+    frame: str, name: str, frames: Mapping[str, Message], path: Path, report: Reporter
+) -> tuple[int, int] | None:
+    if frame not in frames:
+        what = f"no frame before it is called {shown(frame)}"
+        report.error("unknown-type", path, what, did_you_mean(frame, frames, f"use {listed(frames)}"))
+        report.taint(path)
+        return None
+    text = "the request" if frame == "request" else frame
+    known = {value.name: value.type for value in frames[frame].values}
     kind = known.get(name)
     if kind is None:
-        what = f"the request has no field {shown(name)}"
+        what = f"{text} has no field {shown(name)}"
         hint = did_you_mean(name, known, f"its fields are {listed(known)}")
         report.error("unknown-type", path, what, hint)
     elif not isinstance(kind, Scalar) or kind.scaling is not None or kind.meaning is not None:
         report.error(
-            "bad-array", path, f"{name} of the request is not a number of items", "use an unsigned integer"
+            "bad-array", path, f"{name} of {text} is not a number of items", "use an unsigned integer"
         )
     elif kind.minimum < 0 or kind.maximum == 0:
-        what = f"{name} of the request may be {kind.minimum}..{kind.maximum}"
+        what = f"{name} of {text} may be {kind.minimum}..{kind.maximum}"
         report.error("bad-array", path, what, "give it a range of numbers of items, like 1..125")
     else:
         return kind.minimum, kind.maximum

@@ -17,7 +17,7 @@ from qlinkgen.schema.messages import Written
 from qlinkgen.schema.notation import AnswerId, shown
 from qlinkgen.schema.replies import written_replies
 from qlinkgen.schema.report import Reporter, did_you_mean
-from qlinkgen.schema.sizes import sized
+from qlinkgen.schema.sizes import Sized, sized
 from qlinkgen.schema.source import Path
 
 _RULE = "bad-steps"
@@ -72,11 +72,11 @@ class StepBuilder:
         report: Reporter,
         messages: AnyMessages,
         singles: Mapping[str, Message],
-        sizes: dict[str, tuple[tuple[str, str], ...]],
+        sizes: dict[str, Sized],
     ) -> None:
         """``singles`` are the messages outside of commands, which steps may name.
 
-        ``sizes`` takes the sizes of responses that the request says, by command.
+        ``sizes`` takes the sizes of responses that earlier frames say, by command.
         """
         self._file = file
         self._report = report
@@ -93,13 +93,16 @@ class StepBuilder:
         self._check_names(asked)
         own = {step.path[-1]: step for step in own_steps(asked.name, asked.spec)}
         found: list[Step] = []
+        frames = {"request": asked.request}
         for index, spec in enumerate(asked.spec.steps):
             if index == 0 and spec.send == _OWN["send"]:
                 self._check_time(spec, asked.path, index)
                 continue
-            step = self._step(asked, spec, own.get(index), (*asked.path, index))
+            step = self._step(asked, spec, own.get(index), (*asked.path, index), frames)
             if step is not None:
                 found.append(step)
+                if step.sent and index in own:
+                    frames[own[index].name] = step.message
         begun = asked.spec.steps[0].send == _OWN["send"]
         if len(found) == len(asked.spec.steps) - begun:  # otherwise a wrong one is missing
             self._check_order(asked, found)
@@ -154,7 +157,9 @@ class StepBuilder:
         if spec.within is not None:
             self._error((*path, index, "within"), "within has no effect: nothing precedes it", "remove it")
 
-    def _step(self, asked: Asked, spec: StepSpec, own: OwnStep | None, path: Path) -> Step | None:
+    def _step(
+        self, asked: Asked, spec: StepSpec, own: OwnStep | None, path: Path, frames: Mapping[str, Message]
+    ) -> Step | None:
         given = {
             key: each for key, each in (("send", spec.send), ("receive", spec.receive)) if each is not None
         }
@@ -170,7 +175,7 @@ class StepBuilder:
                 what = f"{spec.name} is the name of a message that has one, {written}"
                 self._error((*path, "name"), what, "remove it", path)
         else:
-            message = self._inline(asked, own, sent=sent) if own else None
+            message = self._inline(asked, own, frames, sent=sent) if own else None
         if message is None:
             return None
         if not sent and within is None:
@@ -178,16 +183,16 @@ class StepBuilder:
             within = Allowance(limit.byte_times, limit.seconds) if limit else Allowance()
         return Step(message, sent, within)
 
-    def _inline(self, asked: Asked, step: OwnStep, *, sent: bool) -> Message:
+    def _inline(self, asked: Asked, step: OwnStep, frames: Mapping[str, Message], *, sent: bool) -> Message:
         number = AnswerId(0, relative=True)
         place: Path = ("commands", asked.name, "id")
         if isinstance(step.message, StepMessageSpec) and step.message.id is not None:
             number, place = step.message.id, (*step.path, step.key, "id")
         fields: Fields = step.fields
+        items: set[str] = set()
         if step.last:
-            found = sized(fields, asked.request, step.fields_path, self._report)
-            fields, self._sizes[asked.name] = found
-        items = {name for name, _ in self._sizes.get(asked.name, ()) if step.last}
+            self._sizes[asked.name] = found = sized(fields, frames, step.fields_path, self._report)
+            fields, items = found.fields, {name for name, _ in found.sizes}
         stated = step.message.frame if isinstance(step.message, StepMessageSpec) else None
         layout = Written(
             step.name,

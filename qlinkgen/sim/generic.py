@@ -68,11 +68,9 @@ class GenericNode:
         command = self._commands.get(type(request))
         if command is None or command.response is None:
             return None
-        sizes: dict[str, object] = {}
-        for name, asked, _ in command.sizes:
-            sizes |= _items(command.response, name, getattr(request, asked))
         if command.steps:
-            return self._talk(command, request, sizes)
+            return self._talk(command, request)
+        sizes = _sizes(command, request)
         if command.many is None:
             return self._answer(command.response, request, command.echoes, sizes)
         return self._several(command, command.many, request, sizes)
@@ -95,12 +93,13 @@ class GenericNode:
             return [one] * (count or 1)
         return [one, self._answer(many.reply, request, command.replies[many.reply].echoes, {})]
 
-    def _talk(self, command: Command, request: Framed, sizes: Mapping[str, object]) -> Handling:
+    def _talk(self, command: Command, request: Framed) -> Handling:
         """Yield the answers to each frame of a dialogue."""
+        sizes = _sizes(command, request)
         answers: list[Message] = []
         for who, kind, _ in command.steps:
             if who == "send":
-                yield answers
+                sizes |= _sizes(command, (yield answers))
                 answers = []
             else:
                 last = kind is command.response
@@ -135,6 +134,15 @@ class GenericNode:
         (heard,) = filter(is_message, self._codec.StreamDecoder("response").feed(wire))
         told = answer_to(self._codec)
         return told(request, heard) if told else heard
+
+
+def _sizes(command: Command, asked: Framed) -> dict[str, object]:
+    """Return as many items of each field of the response as a frame asks for."""
+    found: dict[str, object] = {}
+    if command.response is not None and type(asked) is command.sized_by:
+        for name, number, _ in command.sizes:
+            found |= _items(command.response, name, getattr(asked, number))
+    return found
 
 
 def _items(message: type[Message], name: str, count: int) -> dict[str, object]:

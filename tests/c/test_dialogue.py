@@ -49,6 +49,13 @@ commands:
       - {receive: ack}
       - {name: ready, send: {id: 0x31, fields: {}}}
       - {name: bytes, receive: {id: 0x32, fields: {data: "bytes[request.size]"}}}
+  peek:
+    id: 0x40
+    request: {}
+    steps:
+      - {receive: ack}
+      - {name: place, send: {id: 0x41, fields: {size: {type: u8, range: 1..4}}}}
+      - {name: bytes, receive: {id: 0x42, fields: {data: "bytes[place.size]"}}}
   count: {id: 0x20, request: {}, response: {number: u8}}
 """
 PROGRAM = r"""
@@ -161,6 +168,13 @@ def test_a_master_numbers_the_steps(
     program = built(tmp_path, compiler, "-O1", "-std=c99", schema=SCHEMA, text_of_main=MASTER)
     told = subprocess.run([program], check=True, capture_output=True, text=True).stdout
     assert told.split() == ["1", "1", "2", "2", "3", "4", "5", "6", "7", "7"]
+
+
+def test_an_answer_begins_with_the_size_of_the_frame_before_it() -> None:
+    protocol, faults = loads(SCHEMA, "pump.yaml")
+    assert protocol is not None, faults
+    header = "".join(c.generate(protocol, Options()).values())
+    assert header.count("response.data_size = (uint8_t)request.size;") == 1
 
 
 def test_headers_without_dialogues_have_nothing_of_them() -> None:

@@ -50,7 +50,7 @@ commands:
       - {receive: ack}
       - {name: amount, send: {id: 0x13, fields: {count: {type: u8, range: 1..16}}}}
       - {receive: ack}
-      - {name: data, receive: {fields: {data: "bytes[1..16]"}}, within: 100 ms}
+      - {name: data, receive: {fields: {data: "bytes[amount.count]"}}, within: 100 ms}
   confirm:
     id: 0x21
     request: {number: u8}
@@ -209,6 +209,34 @@ def test_a_function_gets_the_answers_so_far(loader: ModuleType) -> None:
     further: list[Further] = [loader.ReadPlace(node=3, start=1), amount]
     assert master.transact(Dialogue(loader.ReadRequest(node=3), further)).response[-1].data == data_of(1, 2)
     assert seen == [(loader.Ack(node=3), loader.Ack(node=3))]
+
+
+def test_a_frame_of_the_dialogue_says_the_size_of_the_answer(
+    loader: ModuleType, engine: MasterEngine
+) -> None:
+    master, _ = bus(loader, GenericNode(loader, 3))
+    assert len(master.transact(reading(loader, 1, 3)).response[-1].data) == 3
+    ack, short, right = (
+        loader.Ack(node=3),
+        loader.ReadData(node=3, data=b"1"),
+        loader.ReadData(node=3, data=b"12"),
+    )
+    times = (0.012, 0.032, 0.052, 0.06, 0.07)
+    arrivals = [(at, each.to_frame()) for at, each in zip(times, (ack, ack, ack, short, right), strict=True)]
+    assert drive(engine, reading(loader, 1, 2), arrivals).response[-1] == right
+    slave = SlaveEngine(loader, GenericNode(loader, 3), baud=9600)
+    slave.node.handle = lambda request, now: answering(loader)  # type: ignore[method-assign]
+    for message in (loader.ReadRequest(node=3), loader.ReadPlace(node=3, start=1)):
+        slave.receive(message.to_frame(), 0.0)
+    with pytest.raises(ValueError, match=r"read\.data: data has 1 items; count of read\.amount asks for 2"):
+        slave.receive(loader.ReadAmount(node=3, count=2).to_frame(), 0.0)
+
+
+def answering(loader: ModuleType) -> Any:
+    """The answers of a node to frames of one dialogue, the last one with another size than asked for."""
+    yield loader.Ack(node=3)
+    yield loader.Ack(node=3)
+    yield [loader.Ack(node=3), loader.ReadData(node=3, data=b"1")]
 
 
 def test_a_master_confirms_the_answer(loader: ModuleType) -> None:
@@ -417,6 +445,9 @@ def test_a_monitor_pairs_the_frames(loader: ModuleType) -> None:
         ("Asked", "read.place"), ("Replied", "ack to read.place"),
         ("Asked", "read.amount"), ("Replied", "ack to read.amount"), ("Replied", "read.data to read.amount"),
         ("Asked", "taken.request"), ("Replied", "taken.response to taken.request"),
+    ]  # fmt: skip
+    assert heard(loader, [*frames[:6], loader.ReadData(node=3, data=b"1")])[6:] == [
+        ("Stray", "read.data"), ("Unanswered", "read.amount"),
     ]  # fmt: skip
 
 

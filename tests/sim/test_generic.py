@@ -43,7 +43,7 @@ def test_every_command(path: Path) -> None:
             assert response is not None
             assert not isinstance(response, list | Generator)
             assert codec.encode(response)
-            assert answers(command, request, response)
+            assert answers(command, request, request, response)
             assert address_of(response) == number
     assert node.requests == len(codec.COMMANDS)
 

@@ -219,18 +219,18 @@ def _entry(
         right=decoded if message.fields else "frame->size == 0U",
         unless_silent=" && !slave->broadcast" if answer and addressing == "either" else "",
         replies=replies,
-        sizes=_sizes(names.command_of(message), message, answer),
+        sizes=_sizes(exchange.command if exchange else None, message, answer),
         turn=turn_name(names, message) if exchange and exchange.turn else "",
         following=turn_name(names, following) if following else "",
     )
 
 
 def _sizes(command: Command | None, sent: Message, answer: Message | None) -> list[tuple[str, str]]:
-    """Members of the response, and those of the request, in the type of the former.
+    """Members of the response, and those of the frame that it answers, in the type of the former.
 
-    In a dialogue, ``sent`` need not be that request, nor its first ``answer`` that response.
+    In a dialogue, ``sent`` need not be the frame with the sizes, nor its first ``answer`` the response.
     """
-    if command is None or answer is None or (sent, answer) != (command.request, command.response):
+    if command is None or answer is None or (sent, answer) != (command.sized_by, command.response):
         return []
     fields = {field.name: field for field in answer.fields}
     return [

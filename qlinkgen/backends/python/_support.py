@@ -745,8 +745,9 @@ class Command:
         repeat_counter: field that distinguishes a repeat from a new request, "" if there is none.
         echoes: fields of the response that repeat the field of the same name in the request.
         many: end of several answers, None if there is one.
-        sizes: fields of the response, those of the request with their number of items, and the bits of
+        sizes: fields of the response, those of an earlier frame with their number of items, and the bits of
             an item if the count of bytes does not tell that number, otherwise 0.
+        sized_by: class of that frame, by default of the request.
         steps: frames of a dialogue after its request: who sends it (send: the master), its class, and its
             time limit in byte times and seconds, None without one.
         replies: answers other than the response, by class.
@@ -760,7 +761,7 @@ class Command:
         "addressing", "attributes", "confirmed", "echoes", "id", "in_flight", "many", "name",
         "repeat_counter",
         "repeat_safe", "replies", "request", "response", "response_byte_times", "response_seconds", "section",
-        "sizes", "steps",
+        "sized_by", "sizes", "steps",
     )  # fmt: skip
 
     def __init__(
@@ -778,6 +779,7 @@ class Command:
         echoes: tuple[str, ...] = (),
         many: Many | None = None,
         sizes: tuple[tuple[str, str, int], ...] = (),
+        sized_by: MessageClass | None = None,
         steps: tuple[tuple[str, MessageClass, tuple[float, float] | None], ...] = (),
         replies: tuple[OtherReply, ...] = (),
         in_flight: int = 1,
@@ -797,6 +799,7 @@ class Command:
         self.echoes = echoes
         self.many = many
         self.sizes = sizes
+        self.sized_by = sized_by or request
         self.steps = steps
         by_class = {each.message: each for each in replies}
         self.replies: Mapping[MessageClass, OtherReply] = by_class

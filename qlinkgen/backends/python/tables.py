@@ -131,6 +131,8 @@ def _answers(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
     ]
     if sizes:
         arguments.append(f"sizes={tuple_of(sizes)}")
+    if command.sized_by is not None and command.sized_by is not command.request:
+        arguments.append(f"sized_by={class_name(kept[command.sized_by.name])}")
     steps = [_step(each, kept[each.message.name]) for each in command.steps]
     if steps:
         arguments.append(f"steps={tuple_of(steps)}")

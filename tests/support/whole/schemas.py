@@ -352,6 +352,9 @@ class _Maker:
         self._last(command, steps)
         if any("receive" in step for step in steps):
             command["steps"] = steps
+            varies = shape.has_length and not shape.trimmed and not shape.least and not shape.groups
+            if varies and shape.most > 8 and "separator" not in command:
+                self._size_from_step(steps)
         elif "response" not in command:
             command["response"] = "none"
 
@@ -441,6 +444,20 @@ class _Maker:
             command["response"] = {value: f"{kind}[request.{name}]"}
             if rows and rng.random() < 0.5:
                 command["response"] = self._row_from_request(value, name)
+
+    def _size_from_step(self, steps: list[Doc]) -> None:
+        """Let a field of a step say how many items the last answer has, where that is a step too."""
+        rng = self.rng
+        last = [step for step in steps if "receive" in step][-1]
+        sent = [step for step in steps[: steps.index(last)] if step.get("send", "request") != "request"]
+        if not sent or isinstance(last["receive"], str) or rng.random() < 0.3:
+            return
+        step, name, value = rng.choice(sent), self.words.name(set()), self.words.name(set())
+        place = step.get("name", f"step_{steps.index(step) + 1}")
+        bounds = rng.choice(("0..2", "1..3", "2..3"))
+        step["send"]["fields"] = {name: {"type": rng.choice(("u8", "u16")), "range": bounds}}
+        fields = {value: f"{rng.choice(('u8', 'i16', 'bytes', 'text'))}[{place}.{name}]"}
+        last["receive"] = {**last["receive"], "fields": fields} if "id" in last["receive"] else fields
 
     def _row_from_request(self, value: str, asked: str) -> Doc:
         """A row of bits whose bytes alone are counted."""

@@ -144,7 +144,7 @@ def of_command(  # noqa: PLR0917  # what the reference reads
         else:
             number = numbered(document, number, direction)
         asked = {value: number for slot in fields.build(spec["request"]) for value, number in _numbers(slot)}
-        slots = fields.build({key: _from_request(each, asked) for key, each in written.items()})
+        slots = fields.build({key: _sized_by(each, "request", asked) for key, each in written.items()})
         slots = tuple(_whole(slot, slots) for slot in slots)
         yield Message(
             f"{name}.{direction}",
@@ -178,8 +178,14 @@ def steps(name: str, spec: Doc, place: Callable[[str | None], tuple[Doc, Fields,
         number = _number(document, written.get("id"), spec.get("id"), direction)
         given = written["fields"]
         if index == last:
-            asked = {value: each for slot in fields.build(spec["request"]) for value, each in _numbers(slot)}
-            given = {each: _from_request(kind, asked) for each, kind in given.items()}
+            frames = {"request": spec["request"]} | {
+                each.get("name", f"step_{at + 1}"): long_form(each["send"])["fields"]
+                for at, each in enumerate(listed[:index])
+                if isinstance(each.get("send"), dict)
+            }
+            for frame, said in frames.items():
+                asked = {value: each for slot in fields.build(said) for value, each in _numbers(slot)}
+                given = {each: _sized_by(kind, frame, asked) for each, kind in given.items()}
         slots = fields.build(given)
         slots = tuple(_whole(slot, slots) for slot in slots) if index == last else slots
         full = f"{name}.{step.get('name', f'step_{index + 1}')}"
@@ -192,10 +198,10 @@ def _numbers(slot: Slot) -> Iterator[tuple[str, Number]]:
         yield slot.name, slot.kind
 
 
-def _from_request(spec: Any, asked: Mapping[str, Number]) -> Any:
-    """A field with the range of the field of the request that has its number of items."""
+def _sized_by(spec: Any, frame: str, asked: Mapping[str, Number]) -> Any:
+    """A field with the range of the field of an earlier frame that has its number of items."""
     text = spec.get("type", "") if isinstance(spec, dict) else spec
-    if not (match := re.search(r"\[request\.(\w+)\]", text)):
+    if not (match := re.search(rf"\[{frame}\.(\w+)\]", text)):
         return spec
     number = asked[match[1]]
     text = text.replace(match[0], f"[{number.low}..{number.high}]")
