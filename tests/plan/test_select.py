@@ -65,6 +65,9 @@ def test_a_request_is_kept_with_all_that_its_master_must_know(more: str) -> None
     protocol, faults = loads(text, "choice.yaml")
     assert protocol is not None, faults
     assert python.load(protocol, Options(only=("log.request",))).COMMANDS.keys() == {"log"}
-    request, command = (plan_of(protocol, Options(only=(name,))).messages for name in ("log.request", "log"))
+    request, command = (
+        [each.name for each in plan_of(protocol, Options(only=(name,))).messages]
+        for name in ("log.request", "log")
+    )
     assert request == command
     assert len(command) > 1
