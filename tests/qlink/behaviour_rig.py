@@ -109,7 +109,7 @@ class Probe(VirtualNode):
 
     Attributes:
         heard: requests, in their order.
-        mute: number of answers to be lost from now on.
+        mute: number of answers to be lost from now on; a busy machine may lose requests too.
         deaf: number of requests to be lost from now on.
         old_number: it answers a node_setup with its old number.
     """

@@ -54,9 +54,10 @@ def test_a_motion_that_fails_stays_pending_and_is_taken_once(make_clean: MakeRig
     rig = make_clean(Slave())
     rig.bus.motion(1, segments=[1])
     for heard in (True, False):  # the answers are lost, or the requests
-        rig.node.mute, rig.node.deaf = (3, 0) if heard else (0, 3)
+        rig.node.mute, rig.node.deaf = (100, 0) if heard else (0, 100)
         with pytest.raises(NoReply):
             rig.bus.motion(1, segments=[2])
+        rig.node.mute = rig.node.deaf = 0
         pending = rig.bus.state.motions[1].pending
         assert pending is not None
         assert pending.segments == [2]
@@ -93,9 +94,10 @@ def test_the_first_motion_after_a_clear_or_a_reset_is_taken_whatever_its_counter
 def test_a_clear_drops_what_is_pending(make_clean: MakeRig, command: str) -> None:
     rig = make_clean(Slave())
     rig.move(1, [1])
-    rig.node.mute = 3
+    rig.node.mute = 100
     with pytest.raises(NoReply):
         rig.bus.motion(1, segments=[2])
+    rig.node.mute = 0
     getattr(rig.bus, command)(1)
     rig.move(1, [3])
     assert rig.node.words == [1, 2, 3]
@@ -108,11 +110,12 @@ def test_a_clear_that_is_not_answered_does_not_bring_back_what_was_pending(
 ) -> None:
     rig = make_clean(Slave(started=True, rate=1e6))
     rig.move(1, [1])
-    rig.node.mute = 6
+    rig.node.mute = 100
     with pytest.raises(NoReply):
         rig.bus.motion(1, segments=[2])
     with pytest.raises(NoReply):
         getattr(rig.bus, command)(1)
+    rig.node.mute = 0
     rig.move(1, [3])
     assert rig.node.words == [1, 2, 3], "2 was moved before the clear, and must not be moved again"
 
