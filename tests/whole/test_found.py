@@ -200,6 +200,11 @@ bus: {kind: master_slave, nodes: 0..255, master: 234}
 commands:
   ask: {id: 5, addressing: node, request: {v: u8}, response: {w: u8}, repeat: safe}
 """,
+    "a check value of each block beside one of the frame, which C called the same": _PARTS.replace(
+        "    crc:", "    each: {type: u8, algorithm: sum8, over: [data], every: 4 bytes}\n    crc:"
+    ).replace("over: [code, data]", "over: [code]")
+    + _BUS
+    + 'messages:\n  log: {id: 5, fields: {v: "u8[9]"}}\n',
     "a count that a value adds, which C did not cover by the check value": _COUNTED.replace(
         "0..40}", "0..40}\n    crc: {type: u8, algorithm: sum8, over: [code, data]}"
     )

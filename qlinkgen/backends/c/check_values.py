@@ -168,8 +168,8 @@ class CheckWriter(Places):
             part.every,
             part.check.size,
             self.algorithms[part.check.algorithm],
-            put_check(part.check, "block", 0, "value"),
-            differs(part.check, "block", 0, "value"),
+            put_check(part.check, "block", 0, "sum"),
+            differs(part.check, "block", 0, "sum"),
         )
 
     def _function(self, part: CheckPart) -> str:
