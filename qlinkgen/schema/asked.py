@@ -68,11 +68,11 @@ class AskedBuilder:
         )
 
     def _data(self, answers: Sequence[Message], least: int, most: int) -> FieldSpec:
-        """The payload; in a frame with a terminator, of the bytes that can be in it."""
+        """The payload; where a terminator is sent as it is, of the bytes that can be in it."""
         size = f"{least}..{most}" if least < most else f"{most}"
         assert isinstance(self._frame, DelimitedFrame)
         spec, doc = {"type": f"bytes[{size}]"}, "Its payload"
-        if self._frame.part("terminator") is not None:
+        if self._frame.part("terminator") is not None and not self._frame.coding:
             found = frozenset[int]().union(*(bytes_in(field) for each in answers for field in each.fields))
             if max(found) < 0x80:
                 spec = {"type": f"text[{size}]"}

@@ -162,7 +162,7 @@ def _fitting_frame(plan: PayloadPlan, values: dict[str, Raw]) -> dict[str, Raw]:
     if not is_too_long(plan, values):
         return values
     for step in reversed([segment.records for segment in plan.segments if segment.records]):
-        records = values[step.name]
+        records = values.get(step.name)  # a case of a choice has another name
         if isinstance(step, RecordsStep) and isinstance(records, list):
             while len(records) > step.length.minimum and is_too_long(plan, values):
                 records = records[1:] if step.last else records[:-1]
@@ -172,7 +172,7 @@ def _fitting_frame(plan: PayloadPlan, values: dict[str, Raw]) -> dict[str, Raw]:
         elif isinstance(step, RecordStep) and records is not None and is_too_long(plan, values):
             values = {**values, step.name: defaults(step.record.payload)}
     for run in plan.runs:
-        given = values[run.name]
+        given = values.get(run.name)
         if (
             isinstance(run, BytesStep | ItemsStep)
             and is_too_long(plan, values)
