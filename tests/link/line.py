@@ -156,6 +156,18 @@ class Node:
         return None
 
 
+class Setter:
+    """Node 3 of a made-up protocol: it answers each request with the response of `set`."""
+
+    number = 3
+
+    def __init__(self, module: Any) -> None:
+        self._response = module.SetResponse
+
+    def handle(self, request: Any, now: float) -> Any:
+        return self._response(node=self.number)
+
+
 def bus(*numbers: int, **options: Any) -> tuple[Wire, VirtualPort, list[Node]]:
     """A simulated line with usual nodes, and the master's port on it."""
     wire = Wire(baud=options.pop("baud", 115200), **options)

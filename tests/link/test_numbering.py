@@ -12,7 +12,7 @@ from qlinkgen.link import MasterEngine, SlaveEngine, Timing
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.schema.loader import loads
-from tests.link.line import drive
+from tests.link.line import Setter, drive
 
 SCHEMA = """\
 qlinkgen: 1
@@ -85,22 +85,12 @@ def test_an_echoed_counter_pairs_requests_and_answers() -> None:
     assert engine.total.strays == 1
 
 
-class _Node:
-    number = 3
-
-    def __init__(self, module: Any) -> None:
-        self._response = module.SetResponse
-
-    def handle(self, request: Any, now: float) -> Any:
-        return self._response(node=3)
-
-
 @pytest.mark.parametrize(
     ("counter", "expected"), [(OF_REQUESTS, [0, 0]), (OF_FRAMES, [0, 1]), (ECHOED, [0x82, 0x83])]
 )
 def test_answers_of_a_slave(counter: str, expected: list[int]) -> None:
     module = made(counter)
-    engine = SlaveEngine(module, _Node(module))
+    engine = SlaveEngine(module, Setter(module))
     found, name = [], module.SetRequest.COUNTER[0]
     for number in (2, 3):
         request = module.SetRequest(node=3, value=1)

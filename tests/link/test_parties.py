@@ -11,7 +11,7 @@ from qlinkgen.link import MasterEngine, SlaveEngine, Timing
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.schema.loader import loads
-from tests.link.line import drive
+from tests.link.line import Setter, drive
 
 SCHEMA = """\
 qlinkgen: 1
@@ -64,19 +64,9 @@ def test_a_master_takes_no_answer_to_another_one(parts: str, name: str) -> None:
     assert engine.total.strays == 1
 
 
-class _Node:
-    number = 3
-
-    def __init__(self, module: Any) -> None:
-        self._response = module.SetResponse
-
-    def handle(self, request: Any, now: float) -> Any:
-        return self._response(node=3)
-
-
 def test_a_slave_answers_to_the_master_that_asked() -> None:
     module = made(BITS)
-    engine = SlaveEngine(module, _Node(module))
+    engine = SlaveEngine(module, Setter(module))
     found = []
     for number in (9, 4):
         engine.receive(module.SetRequest(node=3, master=number, value=1).to_frame(), float(number))

@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
-
 import pytest
-from construct import ConstructError
 
-from qlinkgen.backends import construct, python
-from qlinkgen.model.protocol import Protocol
-from qlinkgen.plan import plan_of
-from qlinkgen.plan.content import BadContent, Raw, Unsendable, measure, pack, unpack
-from qlinkgen.plan.payload import PayloadPlan
-from qlinkgen.schema import loads
+from qlinkgen.plan.content import Raw, Unsendable, measure, pack
+from tests.records.targets import Targets
 
 SCHEMA = """
 qlinkgen: 1
@@ -98,68 +90,33 @@ WRONG = [
     ("values.response", "07 01 00 03", "length"),
     ("values.response", "02 05 0104 05DC 03", "length"),
 ]
-
-
-@cache
-def protocol() -> Protocol:
-    found, faults = loads(SCHEMA, "chosen.yaml")
-    assert found is not None, faults
-    return found
-
-
-def payload_of(name: str) -> PayloadPlan:
-    return plan_of(protocol()).message(name).payload
-
-
-@cache
-def module() -> Any:
-    return python.load(protocol())
-
-
-@cache
-def live() -> construct.Live:
-    return construct.live(protocol())
+TARGETS = Targets(SCHEMA)
 
 
 @pytest.mark.parametrize(("name", "values", "data"), CASES)
 def test_both_ways(name: str, values: dict[str, Raw], data: str) -> None:
-    payload, wire = payload_of(name), bytes.fromhex(data)
-    assert pack(payload, values) == wire
-    assert unpack(payload, wire) == values
-    assert module().MESSAGES[name].from_bytes(wire).to_bytes() == wire
-    assert live().payload(name, live().messages[name].parse(wire)) == wire
-    assert measure(payload_of("values.response"), b"\x02\x04") == 7
+    TARGETS.check_both_ways(name, values, bytes.fromhex(data))
+
+
+def test_sizes_follow_from_the_beginning() -> None:
+    assert measure(TARGETS.payload("values.response"), b"\x02\x04") == 7
 
 
 @pytest.mark.parametrize(("name", "data", "kind"), WRONG)
 def test_wrong_payloads(name: str, data: str, kind: str) -> None:
-    wire = bytes.fromhex(data)
-    with pytest.raises(BadContent) as caught:
-        unpack(payload_of(name), wire)
-    assert caught.value.kind == kind
-    with pytest.raises(module().DecodeError) as refused:
-        module().MESSAGES[name].from_bytes(wire)
-    assert refused.value.kind == kind
-    with pytest.raises(ConstructError):
-        live().messages[name].parse(wire)
+    TARGETS.check_refused(name, bytes.fromhex(data), kind)
 
 
 def test_faults_name_the_choice_in_its_record() -> None:
-    wire = bytes.fromhex("0602 0104 0000")
-    with pytest.raises(BadContent) as caught:
-        unpack(payload_of("options.request"), wire)
-    assert (caught.value.field, caught.value.offset) == ("options[1].value.mru", 4)
-    with pytest.raises(module().DecodeError) as refused:
-        module().MESSAGES["options.request"].from_bytes(wire)
-    assert (refused.value.field, refused.value.offset) == ("options[1].value.mru", 4)
+    TARGETS.check_fault_at("options.request", bytes.fromhex("0602 0104 0000"), "options[1].value.mru", 4)
 
 
 def test_encoders_refuse_the_value_of_another_case() -> None:
-    option = module().Option
-    with pytest.raises(module().EncodeError, match="value"):
+    option = TARGETS.module.Option
+    with pytest.raises(TARGETS.module.EncodeError, match="value"):
         option(kind=1, value=5).to_bytes()
-    with pytest.raises(module().EncodeError, match="value"):
+    with pytest.raises(TARGETS.module.EncodeError, match="value"):
         option(kind=6, value=5).to_bytes()
     with pytest.raises(Unsendable) as caught:
-        pack(payload_of("options.request"), {"options": [MRU, {"kind": 6, "value": 5}]})
+        pack(TARGETS.payload("options.request"), {"options": [MRU, {"kind": 6, "value": 5}]})
     assert caught.value.field == "options[1].value"

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
-
 import pytest
 from construct import ConstructError
 
-from qlinkgen.backends import construct, python
-from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import plan_of
-from qlinkgen.plan.content import BadContent, MoreNeeded, Raw, Unsendable, measure, pack, unpack
+from qlinkgen.plan.content import BadContent, MoreNeeded, Raw, Unsendable, measure, pack
 from qlinkgen.plan.dissect import dissect
-from qlinkgen.plan.payload import PayloadPlan
-from qlinkgen.schema import loads
+from tests.records.targets import Targets
 
 SCHEMA = """
 qlinkgen: 1
@@ -73,104 +67,68 @@ WRONG = [
     ("open.response", "01 0902 02 0902 00", "range"),
     ("open.response", "01 0902 01 0902", "length"),
 ]
-
-
-@cache
-def protocol() -> Protocol:
-    found, faults = loads(SCHEMA, "varied.yaml")
-    assert found is not None, faults
-    return found
-
-
-def payload_of(name: str) -> PayloadPlan:
-    return plan_of(protocol()).message(name).payload
-
-
-@cache
-def module() -> Any:
-    return python.load(protocol())
-
-
-@cache
-def live() -> construct.Live:
-    return construct.live(protocol())
-
-
-def frame(name: str, payload: bytes) -> bytes:
-    return live().wrap(name, payload)
+TARGETS = Targets(SCHEMA)
 
 
 @pytest.mark.parametrize(("name", "values", "data"), CASES)
 def test_both_ways(name: str, values: dict[str, Raw], data: str) -> None:
-    payload, wire = payload_of(name), bytes.fromhex(data)
-    assert pack(payload, values) == wire
-    assert unpack(payload, wire) == values
-    assert module().MESSAGES[name].from_bytes(wire).to_bytes() == wire
-    assert live().payload(name, values) == wire
-    assert live().parse(name.partition(".")[2], frame(name, wire)).fields == live().messages[name].parse(wire)
+    wire = bytes.fromhex(data)
+    TARGETS.check_both_ways(name, values, wire)
+    live = TARGETS.live
+    assert live.payload(name, values) == wire
+    frame = live.wrap(name, wire)
+    assert live.parse(name.partition(".")[2], frame).fields == live.messages[name].parse(wire)
 
 
 @pytest.mark.parametrize(("name", "data", "kind"), WRONG)
 def test_wrong_payloads(name: str, data: str, kind: str) -> None:
-    wire = bytes.fromhex(data)
-    with pytest.raises(BadContent) as caught:
-        unpack(payload_of(name), wire)
-    assert caught.value.kind == kind
-    with pytest.raises(module().DecodeError) as refused:
-        module().MESSAGES[name].from_bytes(wire)
-    assert refused.value.kind == kind
-    with pytest.raises(ConstructError):
-        live().messages[name].parse(wire)
+    TARGETS.check_refused(name, bytes.fromhex(data), kind)
 
 
 def test_faults_name_the_record() -> None:
-    with pytest.raises(BadContent) as caught:
-        unpack(payload_of("open.response"), bytes.fromhex("01 0902 00 0003AA 01 0902"))
-    assert (caught.value.field, caught.value.offset) == ("pairs[1].first.kind", 4)
-    wire = bytes.fromhex("01 0902 00 0003AA 01 0902")
-    with pytest.raises(module().DecodeError) as refused:
-        module().MESSAGES["open.response"].from_bytes(wire)
-    assert (refused.value.field, refused.value.offset) == ("pairs[1].first.kind", 4)
+    TARGETS.check_fault_at(
+        "open.response", bytes.fromhex("01 0902 00 0003AA 01 0902"), "pairs[1].first.kind", 4
+    )
 
 
 def test_encoders_refuse_a_wrong_last_record() -> None:
-    kind = module().MESSAGES["open.response"]
-    pairs = [module().Pair(first=module().Option(kind=1))] * 2
+    kind = TARGETS.module.MESSAGES["open.response"]
+    pairs = [TARGETS.module.Pair(first=TARGETS.module.Option(kind=1))] * 2
     for more in ([], [0, 0], [1, 1], [1, 1, 1]):
-        number = [module().Digits(more=each == 1) for each in more]
-        with pytest.raises(module().EncodeError, match="number"):
+        number = [TARGETS.module.Digits(more=each == 1) for each in more]
+        with pytest.raises(TARGETS.module.EncodeError, match="number"):
             kind(number=number, pairs=pairs).to_bytes()
         raws: Raw = [{"value": 0, "more": each} for each in more]
         with pytest.raises(Unsendable):
-            pack(payload_of("open.response"), {"number": raws, "pairs": [SHORT, SHORT]})
+            pack(TARGETS.payload("open.response"), {"number": raws, "pairs": [SHORT, SHORT]})
 
 
 def test_encoders_refuse_more_than_the_frame_allows() -> None:
     long: dict[str, Raw] = {"kind": 1, "value": bytes(8)}
-    assert payload_of("counted.request").most == 24
+    assert TARGETS.payload("counted.request").most == 24
     with pytest.raises(Unsendable):
-        pack(payload_of("counted.request"), {"options": [long, long, long], "end": 1})
-    options = [module().Option(kind=1, value=bytes(8))] * 3
-    with pytest.raises(module().EncodeError):
-        module().MESSAGES["counted.request"](options=options).to_bytes()
+        pack(TARGETS.payload("counted.request"), {"options": [long, long, long], "end": 1})
+    options = [TARGETS.module.Option(kind=1, value=bytes(8))] * 3
+    with pytest.raises(TARGETS.module.EncodeError):
+        TARGETS.module.MESSAGES["counted.request"](options=options).to_bytes()
     with pytest.raises(ConstructError):
-        live().payload("counted.request", {"options": [{"kind": 1, "value": bytes(8)}] * 3, "end": 1})
+        TARGETS.live.payload("counted.request", {"options": [{"kind": 1, "value": bytes(8)}] * 3, "end": 1})
 
 
 def test_sizes_follow_from_the_beginning() -> None:
-    payload = payload_of("counted.request")
+    payload = TARGETS.payload("counted.request")
     with pytest.raises(MoreNeeded) as more:
         measure(payload, bytes.fromhex("02 0103AA"))
     assert more.value.needed == 6
     assert measure(payload, bytes.fromhex("02 0103AA 0902")) == 7
-    assert measure(payload_of("counted.response"), b"\x06") == 7
+    assert measure(TARGETS.payload("counted.response"), b"\x06") == 7
     with pytest.raises(BadContent):
         measure(payload, bytes.fromhex("04 0101"))
 
 
 def test_dissection_names_the_records() -> None:
-    wire = frame("open.response", bytes.fromhex("81 02 0902 00 0103AA 01 0902"))
-    spans = dissect(plan_of(protocol()), wire, "response").spans
+    wire = TARGETS.live.wrap("open.response", bytes.fromhex("81 02 0902 00 0103AA 01 0902"))
+    spans = dissect(plan_of(TARGETS.protocol), wire, "response").spans
     inside = [each.inside for each in spans if each.inside]
     assert "number[1]." in inside
     assert "pairs[1].second." in inside

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from construct import Container
 
-from ._fields import Message, Values
+from ._fields import Message
 from ._frames import (
     Address,
     Constant,
@@ -21,6 +21,7 @@ from ._frames import (
     Length,
     Part,
     Payload,
+    Sending,
     Stuffing,
     _allowed,
     _size,
@@ -152,6 +153,29 @@ Coding = Escape | Stuffing | Cobs | Digits | Pair | Add
 Bytewise = Escape | Digits | Pair | Add
 
 
+class _Region(NamedTuple):
+    """The parts of a frame that are coded: all but its first ``front`` and last ``back`` bytes."""
+
+    front: int
+    back: int
+
+    @classmethod
+    def of(cls, parts: Sequence[Part], over: Sequence[str]) -> _Region:
+        """The region of the parts ``over``."""
+        names = [part.name for part in parts]
+        sizes = [_size(part) for part in parts]
+        first, last = names.index(over[0]), names.index(over[-1])
+        return cls(sum(sizes[:first]), sum(sizes[last + 1 :]))
+
+    def coded(self, plain: bytes, codings: Iterable[Coding]) -> bytes:
+        """A frame as sent."""
+        end = len(plain) - self.back
+        inner = plain[self.front : end]
+        for coding in codings:
+            inner = coding.add(inner)
+        return plain[: self.front] + inner + plain[end:]
+
+
 class EndedFrame(Frame):
     """A frame that its part ``end`` ends, which does not occur before; it has at most ``most`` bytes.
 
@@ -179,34 +203,17 @@ class EndedFrame(Frame):
         super().__init__(parts, messages, address=address, bare=bare)
         names = [part.name for part in parts]
         sizes = [_size(part) for part in parts]
-        last = names.index(over[-1]) + 1
         self.end = parts[names.index(end)] if end else None
         self.most = most
         self.paired = paired
         self.least = least
         self.coding = coding
-        self.front = sum(sizes[: names.index(over[0])])
-        self.back = sum(sizes[last:])
+        self.region = _Region.of(parts, over)
         self.closing = sum(sizes[names.index(end) :]) if end else 0
         self.sizes = dict(zip(names, sizes, strict=True))
 
-    def wrap(
-        self,
-        message: Message,
-        payload: bytes,
-        address: int = 0,
-        request: bytes = b"",
-        number: int | None = None,
-        *,
-        beside: Values | None = None,
-    ) -> bytes:
-        """See Frame."""
-        plain = super().wrap(message, payload, address, request, number, beside=beside)
-        end = len(plain) - self.back
-        inner = plain[self.front : end]
-        for coding in self.coding:
-            inner = coding.add(inner)
-        return plain[: self.front] + inner + plain[end:]
+    def _wrap(self, sending: Sending) -> bytes:
+        return self.region.coded(super()._wrap(sending), self.coding)
 
     def _frame(self, wire: bytes, request: bytes) -> Container:
         del request
@@ -279,13 +286,13 @@ class EndedFrame(Frame):
 
     def _cells(self, wire: bytes) -> dict[str, bytes]:
         """The decoded bytes of each part."""
-        end = len(wire) - self.back
+        front, end = self.region.front, len(wire) - self.region.back
         plain = wire
-        if self.front < end:
-            inner = wire[self.front : end]
+        if front < end:
+            inner = wire[front:end]
             for coding in reversed(self.coding):
                 inner = coding.remove(inner)
-            plain = wire[: self.front] + inner + wire[end:]
+            plain = wire[:front] + inner + wire[end:]
         size = len(plain) - sum(self.sizes.values())
         if not self.least <= size <= self.payload.most:
             text = (
@@ -333,28 +340,12 @@ class CodedFrame(DelimitedFrame):
         bare: bool = False,
     ) -> None:
         super().__init__(parts, messages, address=address, bare=bare)
-        names = [part.name for part in parts]
-        sizes = [_size(part) for part in parts]
         self.coding = coding
         self.over = over
-        self.front = sum(sizes[: names.index(over[0])])
-        self.back = sum(sizes[names.index(over[-1]) + 1 :])
+        self.region = _Region.of(parts, over)
 
     def _wire(self, data: bytes) -> _Wire:
         return _CodedWire(data, self.coding, self.over)
 
-    def wrap(
-        self,
-        message: Message,
-        payload: bytes,
-        address: int = 0,
-        request: bytes = b"",
-        number: int | None = None,
-        *,
-        beside: Values | None = None,
-    ) -> bytes:
-        """See Frame."""
-        plain = super().wrap(message, payload, address, request, number, beside=beside)
-        end = len(plain) - self.back
-        inner = self.coding.add(plain[self.front : end])
-        return plain[: self.front] + inner + plain[end:]
+    def _wrap(self, sending: Sending) -> bytes:
+        return self.region.coded(super()._wrap(sending), [self.coding])

@@ -39,6 +39,7 @@ class Told(Construct):
     ) -> None:
         super().__init__()
         self.frame = frame
+        self.wrap = frame.wrap
         self.requests = requests
         self.asked = {each.request: each.answers for each in asked}
         others = {
@@ -48,21 +49,6 @@ class Told(Construct):
         self.carrier = frame.by_id[number].name
         self.by_name = frame.by_name | others
         frame.by_name = self.by_name
-
-    def wrap(
-        self,
-        message: Message,
-        payload: bytes,
-        address: int = 0,
-        request: bytes = b"",
-        number: int | None = None,
-        *,
-        beside: Values | None = None,
-    ) -> bytes:
-        """A frame around a payload, see Frame."""
-        return self.frame.wrap(
-            message, payload, address, request, number, beside=beside
-        )
 
     def _build(
         self, obj: Values, stream: BinaryIO, context: Container, path: str

@@ -12,6 +12,7 @@ import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from decimal import Context, Decimal
 from fractions import Fraction
+from io import BytesIO
 from typing import Any, BinaryIO, NamedTuple
 
 from construct import (
@@ -523,22 +524,31 @@ class Message(Construct):
     def _build(
         self, obj: Values, stream: BinaryIO, context: Container, path: str
     ) -> Values:
+        values = self._initial(obj, path)
+        values.update({name: value for name, value in obj.items() if value is not None})
+        for field in self.fields:
+            cell = self._written(field, values.get(field.name), values, path)
+            stream_write(stream, cell, len(cell), path)
+        return obj
+
+    def _initial(self, obj: Values, path: str) -> Container:
+        """The values that are sent where none are given; all that are given must have a field."""
         if unknown := sorted(set(obj) - set(self.defaults)):
             raise ValidationError(
                 f"{self.name} has no field {', '.join(map(str, unknown))}", path=path
             )
-        values = Container(self.defaults)
-        values.update({name: value for name, value in obj.items() if value is not None})
+        return Container(self.defaults)
+
+    def _written(
+        self, field: Renamed, value: object, values: Container, path: str
+    ) -> bytes:
+        """The bytes of a field."""
+        stream = BytesIO()
+        whole = values if isinstance(field.subcon, BitFields) else value
         try:
-            for field in self.fields:
-                whole = (
-                    values
-                    if isinstance(field.subcon, BitFields)
-                    else values.get(field.name)
-                )
-                field._build(whole, stream, values, path)
+            field._build(whole, stream, values, path)
         except TypeError as error:
             raise ValidationError(
                 f"{self.name} has a value of the wrong type: {error}", path=path
             ) from None
-        return obj
+        return stream.getvalue()

@@ -404,6 +404,17 @@ class Stuffing(NamedTuple):
 # Frames
 
 
+class Sending(NamedTuple):
+    """What a frame is built from; ``number`` replaces the message id, ``beside`` has values of the frame."""
+
+    message: Message
+    payload: bytes
+    address: int
+    request: bytes
+    number: int | None
+    beside: Values
+
+
 class Frame(Construct):
     """One frame with one of its messages; it takes all bytes."""
 
@@ -446,16 +457,19 @@ class Frame(Construct):
         *,
         beside: Values | None = None,
     ) -> bytes:
-        """A frame around a payload, which is not checked; ``number`` replaces the message id.
+        """A frame around a payload, which is not checked; see Sending."""
+        sending = Sending(message, payload, address, request, number, beside or {})
+        return self._wrap(sending)
 
-        ``beside`` has values of the frame.
-        """
-        stuffing, shown = self.stuffing, message.id if number is None else number
+    def _wrap(self, sending: Sending) -> bytes:
+        message, payload, address, request, number, beside = sending
+        stuffing = self.stuffing
+        shown = self._number(message) if number is None else number
         sent = stuffing.add(payload) if stuffing and not stuffing.over else payload
         cells: dict[str, bytes] = {}
         for part in self.parts:
             if isinstance(part, Cell):
-                whole = part.number(shown, address, beside or {})
+                whole = part.number(shown, address, beside)
                 cells[part.name] = bytes(part.integer.build(whole))
             else:
                 cells[part.name] = self._cell(part, shown, sent, address, cells)
@@ -476,6 +490,10 @@ class Frame(Construct):
             data = b"".join(cells[name] for name in inner)
             cells |= dict.fromkeys(inner, b"") | {inner[0]: stuffing.add(data)}
         return b"".join(cells[part.name] for part in self.parts)
+
+    def _number(self, message: Message) -> int:
+        """The number of a message in a frame."""
+        return message.id
 
     def _settled(self, cells: dict[str, bytes]) -> dict[str, bytes]:
         """The parts as sent."""
@@ -517,11 +535,7 @@ class Frame(Construct):
     def _build(
         self, obj: Values, stream: BinaryIO, context: Container, path: str
     ) -> Values:
-        message = self.by_name.get(obj["message"])
-        if message is None:
-            raise ValidationError(
-                f"unknown message {obj['message']!r} in this direction", path=path
-            )
+        message = self._named(obj, path)
         address = obj[self.address] if self.address else 0
         if not _allowed(message, address):
             raise ValidationError(
@@ -533,6 +547,15 @@ class Frame(Construct):
         wire = self.wrap(message, payload, address, request, beside=obj)
         stream_write(stream, wire, len(wire), path)
         return obj
+
+    def _named(self, obj: Values, path: str) -> Message:
+        """The message that values are of."""
+        message = self.by_name.get(obj["message"])
+        if message is None:
+            raise ValidationError(
+                f"unknown message {obj['message']!r} in this direction", path=path
+            )
+        return message
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
         wire = stream_read_entire(stream, path)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from io import BytesIO
 from typing import Any, BinaryIO
 
 from construct import (
@@ -182,11 +181,7 @@ class Separated(Message):
     def _build(
         self, obj: Values, stream: BinaryIO, context: Container, path: str
     ) -> Values:
-        if unknown := sorted(set(obj) - set(self.defaults)):
-            raise ValidationError(
-                f"{self.name} has no field {', '.join(map(str, unknown))}", path=path
-            )
-        values = Container(self.defaults)
+        values = self._initial(obj, path)
         values.update(obj)
         texts = [self._text(field, values, path) for field in self.fields]
         while len(texts) > self.needed and not texts[-1]:
@@ -198,14 +193,7 @@ class Separated(Message):
     def _text(self, field: Renamed, values: Container, path: str) -> bytes:
         if field.name in self.optional and values[field.name] is None:
             return b""
-        stream = BytesIO()
-        try:
-            field._build(values.get(field.name), stream, values, path)
-        except TypeError as error:
-            raise ValidationError(
-                f"{self.name} has a value of the wrong type: {error}", path=path
-            ) from None
-        return stream.getvalue()
+        return self._written(field, values.get(field.name), values, path)
 
 
 def _sizes(field: Renamed) -> tuple[int, int]:

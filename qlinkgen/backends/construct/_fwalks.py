@@ -244,11 +244,7 @@ class Walked(Message):
     def _build(
         self, obj: Values, stream: BinaryIO, context: Container, path: str
     ) -> Values:
-        if unknown := sorted(set(obj) - set(self.defaults)):
-            raise ValidationError(
-                f"{self.name} has no field {', '.join(map(str, unknown))}", path=path
-            )
-        values = Container(self.defaults)
+        values = self._initial(obj, path)
         values.update(obj)
         numbers: dict[str, int] = {}
         left_out = False
@@ -297,16 +293,8 @@ class Walked(Message):
         return {slot}
 
     def _cell(self, field: Renamed, values: Container, path: str) -> bytes:
-        stream = BytesIO()
         name = self.slots.get(field.name, field.name)
-        whole = values if isinstance(field.subcon, BitFields) else values.get(name)
-        try:
-            field._build(whole, stream, values, path)
-        except TypeError as error:
-            raise ValidationError(
-                f"{self.name} has a value of the wrong type: {error}", path=path
-            ) from None
-        return stream.getvalue()
+        return self._written(field, values.get(name), values, path)
 
 
 def _values(field: Renamed) -> list[str]:

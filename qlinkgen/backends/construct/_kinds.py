@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import BinaryIO
 
-from construct import Construct, Container, ValidationError
+from construct import Construct, Container
 
 from ._fields import Message, Values
-from ._frames import Constant, DelimitedFrame, Frame, FrameError, Part
+from ._frames import Constant, DelimitedFrame, Frame, FrameError, Part, Sending
 
 
 class AnyKind(Frame):
@@ -20,19 +20,8 @@ class AnyKind(Frame):
     base = 0
     least = 0
 
-    def wrap(
-        self,
-        message: Message,
-        payload: bytes,
-        address: int = 0,
-        request: bytes = b"",
-        number: int | None = None,
-        *,
-        beside: Values | None = None,
-    ) -> bytes:
-        """See Frame."""
-        shown = message.id - self.base if number is None else number
-        return super().wrap(message, payload, address, request, shown, beside=beside)
+    def _number(self, message: Message) -> int:
+        return message.id - self.base
 
     def holds(self, message: Message, size: int) -> bool:
         """Whether it carries the message with a payload of a size."""
@@ -74,28 +63,13 @@ class Kinds(Frame):
             (kind for kind in carrying if kind.holds(message, size)), carrying[-1]
         )
 
-    def wrap(
-        self,
-        message: Message,
-        payload: bytes,
-        address: int = 0,
-        request: bytes = b"",
-        number: int | None = None,
-        *,
-        beside: Values | None = None,
-    ) -> bytes:
-        """See Frame."""
-        kind = self.kind_of(message, len(payload))
-        return kind.wrap(message, payload, address, request, number, beside=beside)
+    def _wrap(self, sending: Sending) -> bytes:
+        return self.kind_of(sending.message, len(sending.payload))._wrap(sending)
 
     def _build(
         self, obj: Values, stream: BinaryIO, context: Container, path: str
     ) -> Values:
-        message = self.by_name.get(obj["message"])
-        if message is None:
-            raise ValidationError(
-                f"unknown message {obj['message']!r} in this direction", path=path
-            )
+        message = self._named(obj, path)
         payload = message.build(obj.get("fields") or {})
         kind = self.kind_of(message, len(payload))
         return kind._build(obj, stream, context, path)  # its kind
