@@ -152,12 +152,12 @@ class Command(Protocol):
         ...
 
     @property
-    def steps(self) -> Sequence[tuple[str, Any, StepSpan | None]]:  # Any: classes of messages
+    def steps(self) -> Sequence[tuple[str, type[Framed], StepSpan | None]]:
         """Frames of a dialogue after its request: send or receive, class, and time limit."""
         ...
 
     @property
-    def replies(self) -> Mapping[Any, OtherReply]:  # Any: classes of messages
+    def replies(self) -> Mapping[type[Message], OtherReply]:
         """Answers other than the response, by class."""
         ...
 
@@ -207,8 +207,7 @@ class Module(Protocol):
 class Encoder(Protocol):
     """Encodes the messages of one protocol."""
 
-    # Any: each protocol has its own class of messages, without a common supertype.
-    def encode(self, message: Any, /) -> bytes:
+    def encode(self, message: Any, /) -> bytes:  # Any: a message of its own protocol
         """Return the whole frame of a message as on the wire."""
         ...
 

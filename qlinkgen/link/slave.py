@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, cast
 
 from qlinkgen.link.codec import (
     Codec,
@@ -35,8 +35,7 @@ class Node(Protocol):
     #: Address of the node. A request may change it.
     number: int
 
-    # Any: a node handles only messages of its own protocol.
-    def handle(self, request: Any, now: float) -> Answers | Handling:
+    def handle(self, request: Any, now: float) -> Answers | Handling:  # Any: a message of its own protocol
         """Execute a request; return its answer, a list of several, or None to send nothing.
 
         A dialogue is a generator: it yields the answers to the request, gets the next frame of the
@@ -316,11 +315,10 @@ class SlaveEngine:
 
     def _handled(self, request: Framed, now: float) -> Answers:
         try:
-            handled: Any = self.node.handle(request, now)  # Any: no generator, without a dialogue
+            # A node returns a generator only for a dialogue.
+            return cast("Answers", self.node.handle(request, now))
         except Refusal as refusal:
             return refusal.reply
-        answers: Answers = handled
-        return answers
 
     def answer(self, request: Framed, response: Message | Sequence[Message], now: float) -> None:
         """Send the answer to a request that its handler did not answer; too late after another request."""

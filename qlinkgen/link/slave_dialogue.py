@@ -21,9 +21,8 @@ class _Pending:
         return "PENDING"
 
 
-#: Returned by a handler that answers later, with `SlaveEngine.answer`. Any: handlers return messages of their
-#: protocol.
-PENDING: Any = _Pending()
+#: Returned by a handler that answers later, with `SlaveEngine.answer`.
+PENDING: Any = _Pending()  # handlers return messages of their protocol
 
 
 class Refusal(Exception):  # the outcome of a request, not an error of the program

@@ -11,8 +11,8 @@ from qlinkgen.model.message import Field, Message
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.payload import Holder, PayloadPlan, Presence, RunStep
 
-#: A document of vectors or one line of it. Any: the entries depend on the message.
-JsonObject = Mapping[str, Any]
+#: A document of vectors or one line of it.
+JsonObject = Mapping[str, Any]  # the entries depend on the message
 
 
 class Header(typing.Protocol):

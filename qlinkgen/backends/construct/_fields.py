@@ -375,6 +375,13 @@ class TextField(BytesField):
         return obj
 
 
+def _innermost(subcon: Construct) -> Construct:
+    """What reads the bytes of a field."""
+    while hasattr(subcon, "subcon"):
+        subcon = subcon.subcon
+    return subcon
+
+
 def _run(field: Renamed) -> ArrayField | None:
     """The array, bytes or text of a field, None for other fields."""
     inner = field.subcon.subcon if isinstance(field.subcon, Default) else field.subcon

@@ -25,7 +25,7 @@ from construct import (
     stream_write,
 )
 
-from ._fields import Message, Row, TextField, Values
+from ._fields import Message, Row, TextField, Values, _innermost
 
 _DECIMAL = re.compile(rb"[+-]?([0-9]*)\.?([0-9]*)\Z")
 _HEXADECIMAL = re.compile(rb"[0-9A-Fa-f]+\Z")
@@ -132,9 +132,8 @@ class Separated(Message):
         separator: bytes,
         leading: bool = False,
         optional: Sequence[tuple[str, bool]] = (),
-        **settings: Any,
+        **settings: Any,  # those of a Message
     ) -> None:
-        # Any: the settings of a Message.
         super().__init__(name, message_id, *fields, **settings)
         self.separator = separator
         self.leading = leading
@@ -198,9 +197,7 @@ class Separated(Message):
 
 def _sizes(field: Renamed) -> tuple[int, int]:
     """Minimum and maximum number of characters that are received."""
-    subcon: Any = field  # Any: construct has no type hints.
-    while hasattr(subcon, "subcon"):
-        subcon = subcon.subcon
+    subcon = _innermost(field)
     if isinstance(subcon, TextNumber):
         return subcon.least if subcon.least == subcon.most else 1, subcon.most
     if isinstance(subcon, Bytes):

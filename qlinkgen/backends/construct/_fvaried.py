@@ -65,8 +65,11 @@ class Several(Construct):
         """Whether a record with these raw numbers is the last one."""
         return bool(self.last) and _hold(self.last, numbers)
 
-    def _build(self, obj: Any, stream: BinaryIO, context: Container, path: str) -> Any:
-        # Any: a list of records, or one.
+    def _build(
+        self, obj: object, stream: BinaryIO, context: Container, path: str
+    ) -> object:
+        if not isinstance(obj, Sequence):
+            raise ValidationError(f"{obj!r} is not a list of records", path=path)
         self.checked(len(obj), path)
         ends = [self.ends(self.record.written(each, stream, path)) for each in obj]
         if self.last and ends != [*[False] * (len(ends) - 1), True]:
@@ -83,7 +86,9 @@ class One(Several):
     def __init__(self, record: VariedRecord) -> None:
         super().__init__(record, 1, 1)
 
-    def _build(self, obj: Any, stream: BinaryIO, context: Container, path: str) -> Any:
+    def _build(
+        self, obj: object, stream: BinaryIO, context: Container, path: str
+    ) -> object:
         self.record.written(obj, stream, path)
         return obj
 
@@ -101,9 +106,8 @@ class Varied(Walked):
         *fields: Renamed,
         most: int,
         presence: Sequence[Presence] = (),
-        **settings: Any,
+        **settings: Any,  # those of a Message
     ) -> None:
-        # Any: the settings of a Message.
         super().__init__(name, message_id, *fields, presence=presence, **settings)
         self.most = most
         self.several = {
@@ -318,9 +322,17 @@ class Varied(Walked):
 class VariedRecord(Varied):
     """A record of variable size, or one that can be the last one: its name and its fields."""
 
-    def __init__(self, name: str, *fields: Renamed, most: int, **settings: Any) -> None:
-        # Any: the presence and the choices of a Walked.
-        super().__init__(name, 0, *fields, most=most, **settings)
+    def __init__(
+        self,
+        name: str,
+        *fields: Renamed,
+        most: int,
+        presence: Sequence[Presence] = (),
+        choices: Sequence[tuple[str, Sequence[str]]] = (),
+    ) -> None:
+        super().__init__(
+            name, 0, *fields, most=most, presence=presence, choices=choices
+        )
 
     def written(self, obj: object, stream: BinaryIO, path: str) -> Mapping[str, int]:
         """Write a record; returns the raw numbers that tests need."""
@@ -367,9 +379,8 @@ class _Taken:
 
 def several_at(
     several: Several, data: bytes, at: int, end: int, number: int | None
-) -> tuple[Any, int]:
+) -> tuple[Container | list[Container], int]:
     """Records at an offset, and that of their end; without a number they extend to ``end``."""
-    # Any: a record, or a list of them.
     if isinstance(several, One):
         values, at, _ = several.record.read(data, at, end, "")
         return values, at

@@ -26,6 +26,7 @@ from ._fields import (
     Row,
     TextField,
     Values,
+    _innermost,
     _signed,
 )
 
@@ -73,9 +74,8 @@ class Walked(Message):
         presence: Sequence[Presence] = (),
         choices: Sequence[tuple[str, Sequence[str]]] = (),
         most: int = 0,
-        **settings: Any,
+        **settings: Any,  # those of a Message
     ) -> None:
-        # Any: the settings of a Message.
         super().__init__(name, message_id, *fields, **settings)
         #: The value of which a field is a case.
         self.slots = {case: slot for slot, cases in choices for case in cases}
@@ -91,9 +91,9 @@ class Walked(Message):
         #: Some fields exclude each other.
         self.most = most or self.most
 
-    def _by_value(self, found: Mapping[str, Any]) -> dict[str, Any]:
+    def _by_value(self, found: Values) -> dict[str, object]:
         """Values by field with one for each choice, that of the case which is present."""
-        values: dict[str, Any] = {}
+        values: dict[str, object] = {}
         for name, value in found.items():
             slot = self.slots.get(name, name)
             if values.get(slot) is None:
@@ -301,13 +301,6 @@ def _values(field: Renamed) -> list[str]:
     """Names of the values of a field."""
     inside = field.subcon.fields if isinstance(field.subcon, BitFields) else (field,)
     return [each.name for each in inside if isinstance(each.subcon, Default)]
-
-
-def _innermost(subcon: Construct) -> Any:
-    # Any: construct has no type hints.
-    while hasattr(subcon, "subcon"):
-        subcon = subcon.subcon
-    return subcon
 
 
 def _number(subcon: Construct, data: bytes) -> int:

@@ -60,8 +60,8 @@ class Sequence:
 Node = Ref | Number | Call | Named | Sequence | int | float | str | bytes | bool | None | tuple["Node", ...]
 
 
-#: An evaluated node. Any: construct has no type hints.
-Value = Any
+#: An evaluated node.
+Value = Any  # construct has no type hints
 
 
 def hexadecimal(value: int, digits: int = 2) -> Number:

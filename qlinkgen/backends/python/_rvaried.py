@@ -11,7 +11,7 @@ from ._support import DecodeError, LayoutError, as_bytes, wrong_size
 TYPE_CHECKING = False  # as typing.TYPE_CHECKING; importing `typing` costs 5 ms
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Any, Self, TypeVar
+    from typing import Self, TypeVar
 
     from ._support import BytesLike, Value
 
@@ -58,7 +58,7 @@ class EndedRule(RecordsRule):
         name: str,
         kind: type[BaseRecord],
         most: int,
-        is_last: Callable[[Any], bool],
+        is_last: Callable[[Value], bool],
     ) -> None:
         self.is_last = is_last
         super().__init__(name, kind, 1, most)

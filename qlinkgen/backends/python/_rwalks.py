@@ -9,12 +9,10 @@ from ._support import BaseMessage, EncodeError, Rule, shown
 
 TYPE_CHECKING = False  # as typing.TYPE_CHECKING; importing `typing` costs 5 ms
 if TYPE_CHECKING:
-    from typing import Any
-
     from ._support import Value
 
 #: Default of a field that a new message has: each message gets an object of its own.
-NEW: Any = object()
+NEW: Value = object()
 
 
 class Misplaced(EncodeError):

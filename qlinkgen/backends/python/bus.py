@@ -240,6 +240,7 @@ class BusModule:
         taken = [values.argument(each, self._place) for each in by_slot(settable)]
         for name, message in self._further(transaction):
             kind = self._class(message)
+            # answers of several classes
             taken.append(f"{name}: {kind} | Callable[[Sequence[Any]], {kind}]")
         return taken
 

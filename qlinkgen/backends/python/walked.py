@@ -123,6 +123,7 @@ class WalkedEncoder(Encoder):
     def _choice(self, cases: Sequence[Segment]) -> list[str]:
         """The statements of the cases of a choice."""
         first = cases[0].steps[0]
+        # each case checks the type of its own value.
         lines, word = [f"{source_of(first)}: Any = self.{held(first)}"], "if"
         for segment in cases:
             (step,), presence = segment.steps, segment.presence
