@@ -26,7 +26,6 @@ from qlinkgen.model.naming import address_attribute, attribute, record_key
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Means, Reply
 from qlinkgen.model.values import Json, to_json
-from qlinkgen.plan.ends import BySilence
 from qlinkgen.plan.framing import frame_plan
 
 CHUNK = 65536
@@ -78,7 +77,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     loaded = load_protocol(protocol, crc, version)
     codec = load_codec(loaded)
     stream = _stream(loaded, codec, direction, request)
-    gaps = isinstance(frame_plan(loaded.frame).end, BySilence)
+    gaps = frame_plan(loaded.frame).silent
     if gaps and raw:
         what = f"only a silence ends a frame of {loaded.name}, and raw bytes have no times"
         raise Failure(f"{what}; give hex text with one frame on each line")

@@ -196,6 +196,11 @@ class Command:
     attributes: Labels = field(default_factory=lambda: MappingProxyType({}))
 
     @property
+    def each(self) -> ByEach | None:
+        """The list whose nodes answer one by one, None for other commands."""
+        return self.many if isinstance(self.many, ByEach) else None
+
+    @property
     def echoes(self) -> tuple[str, ...]:
         """Values of the response that repeat the value of the same name in the request."""
         return self.response.echoes if self.response else ()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from qlinkgen.plan.ends import BySilence, ByTerminator
+from qlinkgen.plan.ends import ByTerminator
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import LengthPart, PayloadPart
@@ -57,7 +57,7 @@ def find_end(frame: FramePlan, wire: bytes, start: int = 0) -> int:
 def read_whole(frame: FramePlan, wire: bytes, start: int = 0) -> Whole:
     """The frame at ``start``, decoded. Raises as `find_end`."""
     assert isinstance(frame.transparency, Coded)
-    if isinstance(frame.end, BySilence):
+    if frame.silent:
         return decoded(frame, wire, start, _silent_end(frame, wire, start))
     assert isinstance(frame.end, ByTerminator)
     stop = find_end(frame, wire, start)

@@ -23,6 +23,7 @@ from qlinkgen.model.frame import (
 from qlinkgen.model.frame import Part as StatedPart
 from qlinkgen.model.integer import Integer, byte_chunks
 from qlinkgen.model.message import Direction
+from qlinkgen.model.texts import Text
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.coding import Add, Insertion, stage
 from qlinkgen.plan.conditional import conditional
@@ -85,6 +86,8 @@ class FramePlan:
         kinds: the kinds of frame, () if there is one; each with its own ``envelope``.
         name: name of the kind, "" if there is one.
         base: what is added to the number of a message in frames of this kind.
+        doc: what the document says of it; "" if there are several kinds, each of which has its own.
+        section: where the document says so.
     """
 
     envelope: Envelope
@@ -97,6 +100,8 @@ class FramePlan:
     kinds: tuple[FramePlan, ...] = ()
     name: str = ""
     base: int = 0
+    doc: Text = ""
+    section: Text = ""
 
     @property
     def every(self) -> tuple[FramePlan, ...]:
@@ -135,6 +140,11 @@ class FramePlan:
     def whole(self) -> bool:
         """Whether the end of a frame is found before anything in it is read."""
         return isinstance(self.end, ByTerminator | BySilence)
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing but a silence ends a frame."""
+        return isinstance(self.end, BySilence)
 
     @property
     def seeded(self) -> bool:
@@ -281,6 +291,8 @@ def _delimited(whole: DelimitedFrame, direction: Direction) -> FramePlan:
         address=address.name if address else "",
         id_name=frame.id_bits[-1].name if frame.id_bits else "",
         idle=frame.idle,
+        doc=frame.doc,
+        section=frame.section,
     )
 
 
@@ -442,6 +454,8 @@ def _marked(frame: MarkedFrame) -> FramePlan:
         receiver=Marks(),
         address=frame.address_name,
         id_name=frame.id_name,
+        doc=frame.doc,
+        section=frame.section,
     )
 
 
@@ -460,4 +474,6 @@ def _packet(frame: PacketFrame, direction: Direction) -> FramePlan:
         receiver=InStep(),
         address="",
         id_name=frame.id_name,
+        doc=frame.doc,
+        section=frame.section,
     )

@@ -533,6 +533,11 @@ class PayloadPlan:
         return payload if self.trim is None else payload.ljust(self.most, b"\0")
 
     @property
+    def filled_in(self) -> tuple[FilledStep, ...]:
+        """The numbers that follow from other bytes."""
+        return tuple(step for step in self.steps if isinstance(step, FilledStep))
+
+    @property
     def walked(self) -> bool:
         """Whether places of fields depend on earlier values or texts, not on counts alone."""
         return bool(self.segments or self.separator)

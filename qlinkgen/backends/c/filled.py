@@ -44,8 +44,4 @@ def derived(bits: int, mask: int, other: str, *, inverted: bool, added: int) -> 
 def has_checks(payload: PayloadPlan) -> bool:
     """Whether the bytes of a record may be wrong in another way than a value out of range."""
     inside = (record.payload for record in payload.records)
-    return any(
-        isinstance(step, FilledStep) and step.fault == "crc"
-        for each in (payload, *inside)
-        for step in each.steps
-    )
+    return any(step.fault == "crc" for each in (payload, *inside) for step in each.filled_in)

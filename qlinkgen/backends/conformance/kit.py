@@ -13,7 +13,7 @@ from qlinkgen.backends.conformance.sources import Sources
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.naming import file_stem
 from qlinkgen.plan import Plan
-from qlinkgen.plan.ends import Gaps, Rescan
+from qlinkgen.plan.ends import Rescan
 
 #: Bits of a row's first byte that name kinds; the two above them say "by hand" and "refused".
 _KINDS = 6
@@ -141,7 +141,7 @@ class Kit:
             address_type=f"uint{header.address_bits}_t",
             address_bytes=header.address_bits // 8,
             rescans=isinstance(self._plan.frame.receiver, Rescan),
-            gaps=isinstance(self._plan.frame.receiver, Gaps),
+            gaps=self._plan.frame.silent,
             packets=self._plan.frame.needs_request,
             broadcast=bool(header.address) and self._plan.protocol.bus.broadcast is not None,
             unaddressed=self._unaddressed(),

@@ -98,7 +98,7 @@ def _heard(
         data = (pieces[index % len(pieces)] if noisy else b"") + row.wire
         heard = [event for byte in data for event in listener.feed(byte)]
         last = isinstance(plan.frame.receiver, Rescan) and index == len(rows) - 1
-        if last or isinstance(plan.frame.receiver, Gaps):
+        if last or plan.frame.silent:
             heard += listener.finish()
         intact += [event.decoded for event in heard if event.decoded]
         events.append(tuple(INTACT if event.decoded else event.kind for event in heard))

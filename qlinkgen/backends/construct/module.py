@@ -14,14 +14,12 @@ from qlinkgen.backends.construct.payload import (
     comment,
     fields,
     integer,
-    is_filled,
     is_varied,
     presence_of,
     record,
 )
 from qlinkgen.backends.construct.tree import Call, Definition, Node, Ref, Sequence, hexadecimal
 from qlinkgen.model import checksum as catalogue
-from qlinkgen.model.frame import FrameKinds
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import record_key
@@ -143,7 +141,7 @@ def _walking(payload: PayloadPlan) -> dict[str, Node]:
 def _class_of(payload: PayloadPlan) -> str:
     if payload.separator:
         return "Separated"
-    prefix = "Filled" if is_filled(payload) else ""
+    prefix = "Filled" if payload.filled_in else ""
     if is_varied(payload):
         return f"{prefix}Varied"
     if payload.walked:
@@ -191,15 +189,12 @@ def _asked(plan: Plan, messages: Mapping[str, str]) -> Iterator[Node]:
 
 def _layouts(plan: Plan, types: Types, algorithms: Algorithms) -> Iterator[Definition]:
     """The parts of frames, of each kind or direction that has its own."""
-    stated = plan.protocol.frame
-    if isinstance(stated, FrameKinds):
-        for kind, described in zip(plan.frame.kinds, stated.kinds, strict=True):
-            said = comment(described.frame.doc, described.frame.section)
-            yield Definition(_kind_layout(kind), _layout(kind.envelope, types, algorithms), said)
-        return
-    said = comment(stated.doc, stated.section)
-    for way, each in plan.ways.items() if not plan.frame.needs_request else ():
-        yield Definition(_layout_name(way), _layout(each.frame.envelope, types, algorithms), said)
+    named = {_kind_layout(kind): kind for kind in plan.frame.kinds}
+    if not named and not plan.frame.needs_request:
+        named = {_layout_name(way): each.frame for way, each in plan.ways.items()}
+    for name, frame in named.items():
+        said = comment(frame.doc, frame.section)
+        yield Definition(name, _layout(frame.envelope, types, algorithms), said)
 
 
 def _layout_name(direction: str) -> str:

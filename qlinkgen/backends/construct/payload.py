@@ -212,7 +212,7 @@ def record(layout: Layout, types: Types) -> Call:
     """The structure of a record."""
     payload = record_plan(layout).payload
     inside: tuple[Node, ...] = (layout.name, *(_Field(layout, types).of(step) for step in payload.steps))
-    prefix = "Filled" if is_filled(payload) else ""
+    prefix = "Filled" if payload.filled_in else ""
     if not payload.walked and layout.name not in types.ended:
         return Call(f"{prefix}Record", inside)
     presence, choices = tuple(presence_of(payload)), tuple(choices_of(payload))
@@ -348,11 +348,6 @@ def _filled(step: FilledStep) -> Call:
         given = algorithm(rule)
     over = Sequence(step.over)
     return Call("Filled", (integer(step.integer), step.integer.bits, over, given))
-
-
-def is_filled(payload: PayloadPlan) -> bool:
-    """Whether a number follows from other bytes."""
-    return any(isinstance(step, FilledStep) for step in payload.steps)
 
 
 def _reserved(step: ReservedStep) -> Call:

@@ -22,7 +22,7 @@ from qlinkgen.model.fields import Value
 from qlinkgen.model.naming import file_stem, method, pascal
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line
-from qlinkgen.model.transaction import ByEach, Command, Reply, Unknown
+from qlinkgen.model.transaction import Command, Reply, Unknown
 from qlinkgen.model.types import Enum
 from qlinkgen.plan import MessagePlan, Plan, plan_of
 from qlinkgen.plan.payload import BytesStep, Holder, RecordsStep, RecordStep, by_slot
@@ -215,7 +215,7 @@ class BusModule:
             nodes=f", {self._nodes()}" if self._nodes() else "",
             others=any(each.done for each in self._transactions),
             many=any(each.command.many for each in self._transactions),
-            listed={isinstance(t.command.many, ByEach) for t in self._transactions if t.command.many},
+            listed={t.command.each is not None for t in self._transactions if t.command.many},
             dialogues=any(each.command.steps for each in self._transactions),
         )
         template = templates().get_template("templates/bus.j2")
@@ -278,8 +278,7 @@ class BusModule:
             names[0] = f"tuple[{', '.join(self._class(each) for each in transaction.answers)}]"
         if transaction.command.many is not None:
             found = " | ".join(names)
-            each = isinstance(transaction.command.many, ByEach)
-            names[0] = f"dict[int, {found} | None]" if each else f"list[{found}]"
+            names[0] = f"dict[int, {found} | None]" if transaction.command.each else f"list[{found}]"
         return " | ".join(names if surely else [*names, "None"])
 
     def _ask(self, call: Transaction, wait: str) -> str:
@@ -287,7 +286,7 @@ class BusModule:
         if call.answers:
             return f"return {wait}self.ask_steps(_request, [{', '.join(n for n, _ in self._further(call))}])"
         kind = "_many" if call.command.many is not None else "_any" if call.done else ""
-        kind = "_each" if isinstance(call.command.many, ByEach) else kind
+        kind = "_each" if call.command.each else kind
         return f"return {wait}self.ask{kind}(_request, {self._asked(call)})"
 
     def _asked(self, transaction: Transaction) -> str:
@@ -498,7 +497,7 @@ class BusModule:
 
 def _answers_once(command: Command) -> bool:
     """Whether a node sends one of several answers."""
-    return isinstance(command.many, ByEach) and not command.many.by
+    return command.each is not None and not command.each.by
 
 
 def _is_reply(reply: Reply, unknown: Unknown) -> bool:

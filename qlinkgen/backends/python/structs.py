@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from qlinkgen.backends.python.floats import letter
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.types import Length
-from qlinkgen.plan.payload import FilledStep, ItemsStep, PayloadPlan
+from qlinkgen.plan.payload import ItemsStep, PayloadPlan
 
 #: A run of at most this many items gets a struct for each count; longer ones build the format at run time.
 MANY_ITEMS = 128
@@ -31,7 +31,7 @@ def tabled(payload: PayloadPlan, byteorder: ByteOrder) -> ItemsStep | None:
     It must be short and the only run of the payload, which has neither records nor numbers that follow from
     other bytes.
     """
-    if payload.records or any(isinstance(step, FilledStep) for step in payload.steps):
+    if payload.records or payload.filled_in:
         return None
     arrays = [step for step in payload.steps if isinstance(step, ItemsStep)]
     if len(payload.runs) != 1 or len(arrays) != 1 or payload.runs[0] is not arrays[0]:
