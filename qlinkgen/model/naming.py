@@ -12,7 +12,10 @@ import keyword
 # Python -----------------------------------------------------------------------------------------------------
 
 #: Methods of every message, and their first parameter.
-_METHODS = frozenset({"to_frame", "to_bytes", "from_bytes", "from_checked", "measure_payload", "self", "cls"})
+_METHODS = frozenset(
+    """to_frame to_bytes from_bytes from_checked measure_payload to_after take_after self
+    cls""".split()  # noqa: SIM905 - reads better than quoted words
+)
 #: Types and decorators in the body of a message class, which an address must not hide.
 _IN_CLASS = frozenset({"int", "bytes", "classmethod"})
 #: Names in the functions that take an address as an argument.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from qlinkgen.model.frame import ATTRIBUTE
@@ -47,6 +47,13 @@ class Envelope:
     def conditional(self) -> tuple[Conditional, ...]:
         """The parts that not every frame has."""
         return tuple(each for each in (self.before, self.after) if each is not None)
+
+    @cached_property
+    def inner(self) -> Envelope:
+        """The frame without the parts at its end that not every frame has."""
+        if self.after is None:
+            return self
+        return replace(self, parts=self.parts[: -len(self.after.parts)], after=None)
 
     def absent(self, part: Part, cells: Mapping[str, bytes]) -> bool:
         """Whether a frame with these parts in its header does not have a part."""

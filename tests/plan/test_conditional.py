@@ -82,6 +82,14 @@ def test_a_value_without_a_place_is_refused(values: dict[str, int]) -> None:
         construct.live(_protocol()).frames["request"].build({"message": "go.request", **values})
 
 
+@pytest.mark.parametrize("signed", [False, True])
+@pytest.mark.parametrize("seal", [None, 0.5, 0x10000, -1])
+def test_an_illegal_value_at_the_end_is_named(seal: object, signed: bool) -> None:
+    with pytest.raises(_module().EncodeError) as error:
+        _module().GoRequest(speed=9, signed=signed, seal=seal).to_frame()
+    assert (error.value.field, error.value.value) == ("seal", seal)
+
+
 @pytest.mark.parametrize("text", [text for _, text in _FRAMES])
 def test_each_beginning_of_a_frame_is_dissected(text: str) -> None:
     wire, plan = bytes.fromhex(text), plan_of(_protocol())

@@ -202,7 +202,7 @@ class ClassBuilder:
         decoder = make_decoder(message, place, title, scales)
         name = "" if place.envelope is None else "body"
         encode = encoder.statements(name)
-        stored = (*(place.beside if place.envelope else ()), *message.payload.settable)
+        stored = (*place.inside, *message.payload.settable)
         names = sorted({held(each) for each in stored}, key=natural)
         return replace(
             head,

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from qlinkgen.backends.python import pieces
-from qlinkgen.backends.python.layout import literal
-from qlinkgen.backends.python.names import attribute
+from qlinkgen.backends.python import pieces, values
+from qlinkgen.backends.python.decode import Decoder
+from qlinkgen.backends.python.encode import Encoder
+from qlinkgen.backends.python.layout import listing, literal
+from qlinkgen.backends.python.names import attribute, held, natural
+from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.varied import condition
 from qlinkgen.model.condition import Test
+from qlinkgen.model.types import Scalar
 from qlinkgen.plan.conditional import Conditional, Selector
 from qlinkgen.plan.envelope import Envelope
+from qlinkgen.plan.parts import CellPart
+from qlinkgen.plan.tree import MessagePlan
 
 
 @dataclass(frozen=True)
@@ -19,7 +25,6 @@ class ConditionalView:
     """Parts directly before the payload, or at the end, that only some frames have.
 
     Attributes:
-        place: "before" or "after", with which the name of its function ends.
         names: attributes of messages for their values, or the name of a length, for texts.
         holds_values: they hold values, not a length.
         test: statements of a function that tells from ``head`` whether a frame has them.
@@ -27,29 +32,105 @@ class ConditionalView:
         initial: these bytes where a frame does not have them.
     """
 
-    place: str
     names: str
     holds_values: bool
-    test: list[str]
+    test: Sequence[str]
     size: int
     initial: str
 
 
-def conditional_view(envelope: Envelope, place: str) -> ConditionalView | None:
-    """The view of the parts before the payload or at the end, None if each frame has them."""
-    found = envelope.before if place == "before" else envelope.after
+@dataclass(frozen=True)
+class AfterView(ConditionalView):
+    """Parts at the end.
+
+    Attributes:
+        met: the same as an expression.
+        values: the values in them.
+        octets: statements of a method that returns their bytes.
+        taken: statements of a method that sets the values from the end of ``frame``.
+    """
+
+    met: str
+    values: Sequence[AfterValue]
+    octets: Sequence[str]
+    taken: Sequence[str]
+
+    @property
+    def needed(self) -> str:
+        """The expression for whether ``frame`` has them, or ``message`` has other values than without them.
+
+        Identity is faster than a comparison, and enough: `octets` tells equal values.
+        """
+        tests = [f"message.{each.name} is not {each.constant}" for each in self.values]
+        return " or ".join([self.met.replace("head", "frame"), *tests])
+
+    def slots(self, address: str = "") -> list[str]:
+        """The statement for the slots of the values, and of an address."""
+        names = sorted([*filter(None, [address]), *(each.name for each in self.values)], key=natural)
+        return listing("__slots__ = (", [f'"{name}"' for name in names], ")", 4)
+
+
+@dataclass(frozen=True)
+class AfterValue:
+    """A value in parts at the end: its attribute and type, and the constant with its default."""
+
+    name: str
+    annotation: str
+    default: str
+
+    @property
+    def constant(self) -> str:
+        """The name of the constant."""
+        return f"_NO_{self.name.upper()}"
+
+
+def before_view(envelope: Envelope) -> ConditionalView | None:
+    """The view of the parts before the payload, None if each frame has them."""
+    return ConditionalView(*_facts(envelope, envelope.before)) if envelope.before else None
+
+
+def after_view(
+    envelope: Envelope, message: MessagePlan, place: Place, scale: Callable[[str, Scalar], str]
+) -> AfterView | None:
+    """The view of the parts at the end, None if each frame has them; ``message`` is one that has them."""
+    found = envelope.after
     if found is None:
         return None
+    parts = [part for part in found.parts if isinstance(part, CellPart)]
+    scales = {each.name: scale(each.name, each.number) for each in found.values if each.number.scaling}
+    encoder, decoder = Encoder(message, place, "", "", scales), Decoder(message, place, "", scales)
+    octets = [encoder.octets(part) for part in parts]
+    for part in parts:
+        decoder.take_end(envelope, part)
+    taken = [line.replace("message.", "self.") for line in decoder.assignments]
+    return AfterView(
+        *_facts(envelope, found),
+        met=_met(envelope, found),
+        values=[
+            AfterValue(held(each), values.annotation((each,), place), values.default(each, place))
+            for each in found.values
+        ],
+        octets=[*encoder.checks, f"return {' + '.join(octets)}"],
+        taken=["cls = type(self)", *taken] if any("illegal(" in line for line in taken) else taken,
+    )
+
+
+def _facts(envelope: Envelope, found: Conditional) -> tuple[str, bool, Sequence[str], int, str]:
+    """The first attributes of a view."""
     names = [attribute(member.name) for member in found.values] or [each.name for each in found.parts]
     listed = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
-    return ConditionalView(
-        place=place,
-        names=listed,
-        holds_values=found.length is None,
-        test=list(_tests(envelope, found)),
-        size=found.size,
-        initial=literal(found.initial),
-    )
+    tests = list(_tests(envelope, found))
+    return listed, found.length is None, tests, found.size, literal(found.initial)
+
+
+def _met(envelope: Envelope, found: Conditional) -> str:
+    """The condition as an expression: without a call if it is simple."""
+    if len(found.selectors) == 1:
+        number = _number(envelope, found.selectors[0])
+        test = condition((replace(found.selectors[0].test, value="number"),), "{}")
+        if test.count("number") == 1 and " or " not in test and " and " not in test:
+            return test.replace("number", number)
+    return "_has_after(head)"
 
 
 def _tests(envelope: Envelope, found: Conditional) -> Iterator[str]:

@@ -13,6 +13,7 @@ from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
 from qlinkgen.model.integer import Integer, packed_size
 from qlinkgen.model.types import Enum, Flags, Float, Scalar
+from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import Size, Within
 from qlinkgen.plan.parts import (
     AddressPart,
@@ -120,8 +121,14 @@ class Decoder:
             *self._sizes,
             *self._slices,
             *self._values,
+            *self._absent(),
             "return message",
         ]
+
+    def _absent(self) -> list[str]:
+        """The statements that give defaults to values of parts that a frame does not have."""
+        values_after = self.place.after.values if self.place.after else ()
+        return [f"message.{held(each)} = {values.default(each, self.place)}" for each in values_after]
 
     @property
     def _bad_layout(self) -> str:
@@ -153,7 +160,7 @@ class Decoder:
         elif place.address and self.message.allowed is not None:
             # The caller sets the real address.
             chosen = [f"{place.address}={self.message.message.default_address}", *chosen]
-        if not place.beside or place.envelope is None:
+        if not place.inside:
             lines += wrapped("return cls(", chosen, ")", _INDENT + 4)
             return [f"if {test}:", *indented(lines)]
         lines += wrapped("message = cls(", chosen, ")", _INDENT + 4)
@@ -516,6 +523,17 @@ class Decoder:
             mask = (1 << member.bits) - 1
             taken = f"{whole} >> {member.shift} & 0x{mask:X}" if member.shift else f"{whole} & 0x{mask:X}"
             self.get_member(member, taken, self._offset(step))
+
+    def take_end(self, envelope: Envelope, part: CellPart) -> None:
+        """Check and assign the values of a part after the payload of ``frame``."""
+        seen = pieces.read(envelope, part, "frame")
+        whole = f"({seen})" if " | " in seen else seen
+        for member in part.values:
+            taken = seen
+            if member.bits < part.integer.bits:
+                shifted = f"{whole} >> {member.shift}" if member.shift else whole
+                taken = f"{shifted} & 0x{(1 << member.bits) - 1:X}"
+            self.get_member(member, taken, str(-envelope.from_end(part)), "frame")
 
     @property
     def assignments(self) -> list[str]:

@@ -112,6 +112,17 @@ class Encoder:
         """Convert and check a value of the frame."""
         self._member(member)
 
+    def octets(self, part: CellPart) -> str:
+        """Convert and check the values of a part of the frame; the expression for its bytes."""
+        number = self._part_number(part)
+        self._use_text(part.integer)
+        if part.integer.byteorder is None and not part.integer.text:
+            self._lines.append(f"{part.name}_part = {bare(number)}")
+            groups = [integers.group_out(f"{part.name}_part", chunk) for chunk in part.integer.chunks]
+            return f"bytes(({', '.join(groups)}{',' if len(groups) == 1 else ''}))"
+        primary = number if number.isidentifier() else f"({bare(number)})"
+        return integers.to_bytes(part.integer, primary)
+
     @property
     def checks(self) -> list[str]:
         """The statements so far that convert and check values."""

@@ -66,7 +66,7 @@ def unknown_view(plan: Plan) -> UnknownView | None:
     ):
         return None
     frame = plan.frames["request"]
-    envelope, address = frame.envelope, plan.frame.address
+    envelope, address = frame.envelope.inner, plan.frame.address
     arguments = [f"{address_attribute(address)}=node or 0"] if address else []
     arguments += [f"{attribute(name)}={raw}" for name, raw in unknown.raws]
     return UnknownView(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from qlinkgen.backends.python.coding import CodingView
-from qlinkgen.backends.python.conditional import ConditionalView
+from qlinkgen.backends.python.conditional import AfterView, ConditionalView
 
 
 @dataclass(frozen=True)
@@ -228,7 +228,8 @@ class PartsView:
         seeds: attributes of message classes that check values cover.
         blank: the zeros of the check value at the end of the frame, "" if something else is there.
         trim: bytes of a payload that are sent even if they are zeros at its end, None if all are.
-        conditional: parts that only some frames have; code works on frames with all of them.
+        before: parts before the payload that only some frames have; code works on frames with them.
+        after: parts at the end that only some frames have; code works on frames without them.
     """
 
     title: str
@@ -263,14 +264,20 @@ class PartsView:
     #: Attribute and number of the master where only answers have it, as a tuple; "" elsewhere.
     master: str
     tail_tests: Sequence[str]
-    conditional: Sequence[ConditionalView] = ()
+    before: ConditionalView | None = None
+    after: AfterView | None = None
 
     template = "delimited"
 
     @property
     def extra(self) -> int:
         """Bytes of the header that only some frames have."""
-        return sum(each.size for each in self.conditional if each.place == "before")
+        return self.before.size if self.before else 0
+
+    @property
+    def specific(self) -> bool:
+        """Whether the bytes around the payload depend on more of a message than its own code packs."""
+        return bool(self.seeds or self.after)
 
     @property
     def main(self) -> PlacedCheck | None:

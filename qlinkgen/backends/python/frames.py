@@ -7,7 +7,7 @@ from typing import assert_never
 
 from qlinkgen.backends.python import integers, pieces
 from qlinkgen.backends.python.coding import coding_view
-from qlinkgen.backends.python.conditional import conditional_view
+from qlinkgen.backends.python.conditional import before_view
 from qlinkgen.backends.python.frame_checks import all_placed, check_bytes, check_view, seed_name
 from qlinkgen.backends.python.frame_directions import by_id
 from qlinkgen.backends.python.frame_views import (
@@ -189,7 +189,8 @@ def wrap_lines(view: UniqueView, fixed: int | None) -> list[str]:
 
 
 def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
-    envelope = plan.frame.envelope
+    whole = plan.frame.envelope
+    envelope = whole.inner
     address = _address_view(plan)
     length = _length_view(plan, envelope)
     checks, filling = all_placed(envelope, early=not plan.frame.whole)
@@ -224,11 +225,11 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
         bare=bare,
         verified=verified,
         head_checks=list(_head_checks(plan, envelope, bare=bare)),
-        values=[attribute(member.name) for _, member in envelope.values],
+        values=[attribute(member.name) for _, member in whole.values],
         counter=_counter(plan),
         master=_master(plan),
         tail_tests=[test for part in envelope.back for test in _tail_tests(envelope, part)],
-        conditional=[each for place in ("before", "after") if (each := conditional_view(envelope, place))],
+        before=before_view(envelope),
     )
 
 

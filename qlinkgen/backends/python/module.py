@@ -11,6 +11,7 @@ from qlinkgen.backends import python_text
 from qlinkgen.backends.base import banner
 from qlinkgen.backends.python import frames, tables
 from qlinkgen.backends.python.classes import ClassBuilder, ClassModel
+from qlinkgen.backends.python.conditional import after_view
 from qlinkgen.backends.python.fitted import fitted
 from qlinkgen.backends.python.frame_checks import maker_of
 from qlinkgen.backends.python.frame_directions import (
@@ -212,7 +213,7 @@ class Module:
             case UniqueView():
                 return frames.wrap_lines(view, each.body_size)
             case PartsView():
-                return [f"return _wrapped(body{', self' if view.seeds else ''})"]
+                return [f"return _wrapped(body{', self' if view.specific else ''})"]
             case MarkedView() | PacketView() | KindsView():
                 return []
 
@@ -244,6 +245,7 @@ class Module:
             case PartsView():
                 used |= {"wrong_check", view.blocks.view.maker} if view.blocks else set()
                 used |= {"UNREAD"} if view.quick else set()
+                used |= {"REFUSALS", "settled"} if _has_after(views) else set()
             case MarkedView():
                 used |= {"Marking", "illegal", "index", "refused"}
             case PacketView():
@@ -298,7 +300,13 @@ class Module:
 
 
 def _view(plan: Plan, title: str, sizes: Sequence[int], make: Maker) -> AnyView:
-    return kinds_view(plan, title, make) if plan.frame.kinds else frames.view_of(plan, title, sizes)
+    if plan.frame.kinds:
+        return kinds_view(plan, title, make)
+    view = frames.view_of(plan, title, sizes)
+    if not isinstance(view, PartsView):
+        return view
+    after = after_view(plan.frame.envelope, plan.messages[0], make.place, make.scale)
+    return replace(view, after=after)
 
 
 def _asked(plan: Plan) -> list[str]:
@@ -335,6 +343,11 @@ def _placed(template: str, module: ModuleView, **parts: str) -> str:
 def _has_digits(plan: Plan) -> bool:
     coded = plan.frame.transparency
     return isinstance(coded, Coded) and any(isinstance(stage, Digits) for stage in coded.stages)
+
+
+def _has_after(views: Sequence[AnyView]) -> bool:
+    """Whether frames end with parts that only some have."""
+    return any(isinstance(each, PartsView) and each.after for each in views)
 
 
 def _has_late_check(views: Sequence[AnyView]) -> bool:

@@ -10,6 +10,7 @@ from qlinkgen.backends.python.names import named_classes
 from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.naming import address_attribute
+from qlinkgen.plan.conditional import Conditional
 from qlinkgen.plan.ends import Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import CheckPart, Part
@@ -25,6 +26,7 @@ class Place:
         byteorder: byte order of the structs.
         classes: class of each enum, flags and record.
         envelope: the frame if classes handle whole frames, None if they handle only payloads.
+        after: parts after it, which the base class of messages handles; None if there are none.
         address: attribute that holds the address, "" if there is none.
         unique: the last step of an encoder adds the preamble, and the receiver checks it.
         texts: print text defaults as text, not as numbers.
@@ -38,6 +40,7 @@ class Place:
     envelope: Envelope | None
     address: str
     unique: bool
+    after: Conditional | None = None
     texts: bool = True
     members: tuple[Member, ...] = ()
     used: set[str] = field(default_factory=set, compare=False)
@@ -57,12 +60,12 @@ class Place:
     @property
     def bare(self) -> Place:
         """The place of a record: without a frame."""
-        return replace(self, envelope=None, address="", unique=False)
+        return replace(self, envelope=None, after=None, address="", unique=False)
 
     def within(self, envelope: Envelope) -> Place:
         """The place in the frames of a direction or kind."""
         if self.envelope:
-            return replace(self, envelope=envelope)
+            return replace(self, envelope=envelope.inner, after=envelope.after)
         return replace(self, members=tuple(member for _, member in envelope.values))
 
     @property
@@ -104,7 +107,12 @@ class Place:
     @property
     def beside(self) -> tuple[Member, ...]:
         """Values of every frame."""
-        return tuple(member for _, member in self.envelope.values) if self.envelope else self.members
+        return (*self.inside, *(self.after.values if self.after else ()), *self.members)
+
+    @property
+    def inside(self) -> tuple[Member, ...]:
+        """Values of every frame that the class of a message packs."""
+        return tuple(member for _, member in self.envelope.values) if self.envelope else ()
 
     @property
     def data(self) -> str:
@@ -131,7 +139,7 @@ def place_of(plan: Plan) -> Place:
             envelope, unique = None, False
         case _:
             assert_never(plan.frame.receiver)
-    return Place(
+    place = Place(
         byteorder=plan.protocol.byteorder,
         classes=named_classes(plan),
         envelope=envelope,
@@ -139,3 +147,4 @@ def place_of(plan: Plan) -> Place:
         unique=unique,
         texts=plan.protocol.texts,
     )
+    return place.within(envelope) if envelope else place

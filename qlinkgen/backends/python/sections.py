@@ -10,6 +10,7 @@ import jinja2
 
 from qlinkgen.backends import python_text
 from qlinkgen.backends.base import environment
+from qlinkgen.backends.python.frame_views import PartsView
 from qlinkgen.backends.python.kinds import AnyView
 from qlinkgen.backends.python.ways import Ways, definitions, differing, merged
 from qlinkgen.model.message import Direction
@@ -58,7 +59,10 @@ class Sections:
     @functools.cached_property
     def _made(self) -> Mapping[str, Mapping[str, str]]:
         """Definitions for encoding and for the parts of frames, by direction."""
-        return {way: definitions(self._rendered("delimited", view)) for way, view in self.views.items()}
+        return {
+            way: definitions(self._rendered("delimited", view, owner=way_class(way)))
+            for way, view in self.views.items()
+        }
 
     @functools.cached_property
     def _found(self) -> Mapping[str, Mapping[str, str]]:
@@ -80,9 +84,10 @@ class Sections:
         view = self._view
         if view.template != "delimited":
             return self._rendered(view.template, view).strip()
-        message = self._rendered("delimited_message", view)
+        ended = any(isinstance(each, PartsView) and each.after for each in self.views.values())
+        message = self._rendered("delimited_message", view, ended=ended)
         if not self.directed:
-            return (self._rendered("delimited", view) + message).strip()
+            return (self._rendered("delimited", view, owner="Message") + message).strip()
         texts = [merged(self._made, self.ways), message]
         for way, each in self.views.items():
             text = self._rendered("delimited_way", each, base=way_class(way), way=way)

@@ -101,7 +101,7 @@ class SeparatedDecoder(WalkedDecoder):
         for part in behind:
             self._part(part, at)
             at += part.size
-        return [*lines, *header, *self._flushed(), "return message"]
+        return [*lines, *header, *self._flushed(), *self._absent(), "return message"]
 
     def _text(self, step: TextStep, offset: str) -> list[str]:
         local, target = f"{step.name}_text", f"message.{attribute(step.name)}"

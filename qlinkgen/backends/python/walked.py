@@ -209,7 +209,7 @@ class WalkedDecoder(Decoder):
         for part in self._needed_back():
             self._part(part, at)
             at += part.size
-        return [*lines, *header, *self._flushed(), "return message"]
+        return [*lines, *header, *self._flushed(), *self._absent(), "return message"]
 
     def _front(self) -> tuple[list[str], list[str]]:
         """Statements that unpack the header, and those that check and assign its values, which come last."""
