@@ -92,7 +92,7 @@ class Rule:
                     found |= {each.name: None for each in holders((step,))}
                     continue
             found |= self._of(step)
-        return _fitting_frame(plan, by_value(plan, found))
+        return by_value(plan, _fitting_frame(plan, found))
 
     def beside(self, envelope: Envelope) -> dict[str, Raw]:
         """The raw values of a frame; those that it does not have are their defaults."""
@@ -158,36 +158,36 @@ def _ended(step: RecordsStep, records: list[dict[str, Raw]]) -> list[dict[str, R
 
 
 def _fitting_frame(plan: PayloadPlan, values: dict[str, Raw]) -> dict[str, Raw]:
-    """The values with fewer or default records, and shorter runs, until a frame can hold them."""
-    if not is_too_long(plan, values):
+    """The values by field with fewer or default records, and shorter runs, until a frame can hold them."""
+    if not _is_too_long(plan, values):
         return values
     for step in reversed([segment.records for segment in plan.segments if segment.records]):
-        records = values.get(step.name)  # a case of a choice has another name
+        records = values[step.name]
         if isinstance(step, RecordsStep) and isinstance(records, list):
-            while len(records) > step.length.minimum and is_too_long(plan, values):
+            while len(records) > step.length.minimum and _is_too_long(plan, values):
                 records = records[1:] if step.last else records[:-1]
                 values = {**values, step.name: records}
-            if is_too_long(plan, values):
+            if _is_too_long(plan, values):
                 values = {**values, step.name: [defaults(step.record.payload) for _ in records]}
-        elif isinstance(step, RecordStep) and records is not None and is_too_long(plan, values):
+        elif isinstance(step, RecordStep) and records is not None and _is_too_long(plan, values):
             values = {**values, step.name: defaults(step.record.payload)}
     for run in plan.runs:
-        given = values.get(run.name)
+        given = values[run.name]
         if (
             isinstance(run, BytesStep | ItemsStep)
-            and is_too_long(plan, values)
+            and _is_too_long(plan, values)
             and isinstance(given, bytes | list)
         ):
             values = {**values, run.name: given[: run.length.minimum]}
     return values
 
 
-def is_too_long(plan: PayloadPlan, values: Mapping[str, Raw]) -> bool:
+def _is_too_long(plan: PayloadPlan, values: Mapping[str, Raw]) -> bool:
     """Whether records of variable size are too many for a frame."""
     if not any(segment.records for segment in plan.segments):
         return False
     try:
-        pack(plan, values)
+        pack(plan, by_value(plan, values))
     except Unsendable:
         return True
     return False

@@ -356,9 +356,12 @@ class Message:
         """Minimum and maximum size of the payload."""
         if self.separator:  # absent texts at the end are left out with the separators before them
             sizes = [slot.text_sizes for slot in self.slots]
-            needed = max((at for at, slot in enumerate(self.slots) if not slot.optional), default=0)
-            texts = (low for (low, _), slot in zip(sizes, self.slots, strict=True) if not slot.optional)
-            return sum(texts) + needed, sum(high for _, high in sizes) + len(sizes) - 1
+            first = 0 if self.leading else 1  # of the texts after a separator
+            needed = [at for at, slot in enumerate(self.slots) if not slot.optional]
+            least = max(needed, default=first - 1) + 1 - first
+            return sum(sizes[at][0] for at in needed) + least, sum(high for _, high in sizes) + len(
+                sizes
+            ) - first
         always = [slot for slot in self.slots if not slot.conditional]
         most = most_bytes(self.slots)
         if self.limit is not None and any(slot.walked for slot in self.slots):
