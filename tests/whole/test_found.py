@@ -205,6 +205,9 @@ commands:
     ).replace("over: [code, data]", "over: [code]")
     + _BUS
     + 'messages:\n  log: {id: 5, fields: {v: "u8[9]"}}\n',
+    "a count that a value adds at the end of a stuffed frame, which Python did not wait for": _COUNTED
+    + "messages:\n  log: {id: 5, fields: {on: bool, n: {type: u8, counts: v, if: on},"
+    ' v: {type: "u8[1..3]", if: on}}}\n',
     "a count that a value adds, which C did not cover by the check value": _COUNTED.replace(
         "0..40}", "0..40}\n    crc: {type: u8, algorithm: sum8, over: [code, data]}"
     )

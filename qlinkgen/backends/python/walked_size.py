@@ -73,15 +73,16 @@ class _Measure:
     def _segment(self, segment: Segment) -> list[str]:
         if segment.records is not None:
             return self._records(segment.records, present=segment.presence is None)
-        lines = [line for step in segment.steps for line in self._decided(step)]
+        decided = [line for step in segment.steps for line in self._decided(step)]
         run = segment.run
-        size = str(segment.size) if run is None else times(run)
-        more = size
-        if run is not None and segment.presence is None and run.length.minimum:
+        if run is None:
+            size = str(segment.size)
+            # Known before its bytes are read, which a receiver of stuffed frames takes only as far as needed.
+            return [*([f"size += {size}"] if segment.presence else []), *decided, f"start += {size}"]
+        size = more = times(run)
+        if segment.presence is None and run.length.minimum:
             more = f"{size} - {run.item_size * run.length.minimum}"
-        if run is not None or segment.presence is not None:
-            lines.append(f"size += {more}")
-        return [*lines, f"start += {size}"]
+        return [*decided, f"size += {more}", f"start += {size}"]
 
     def _records(self, step: RecordStep | RecordsStep, *, present: bool) -> list[str]:
         """The statements for walked records; some of them are in the minimum of what is ``present``."""
