@@ -726,6 +726,11 @@ def all_records(payloads: Iterable[PayloadPlan]) -> tuple[RecordPlan, ...]:
     return tuple(found.values())
 
 
+def nested(depth: int) -> str:
+    """The suffix of the locals of a record so deep inside of others; no name of a schema has a capital."""
+    return f"_R{depth}"
+
+
 def renamed(segments: Iterable[Segment], suffix: str) -> tuple[Segment, ...]:
     """Segments whose steps have a suffix, for the locals of records inside of others."""
     return tuple(

@@ -208,6 +208,9 @@ commands:
     "a count that a value adds at the end of a stuffed frame, which Python did not wait for": _COUNTED
     + "messages:\n  log: {id: 5, fields: {on: bool, n: {type: u8, counts: v, if: on},"
     ' v: {type: "u8[1..3]", if: on}}}\n',
+    "a field called like a number of a record, which hid it where the size is measured": _COUNTED
+    + 'types:\n  item: {fields: {n: {type: u8, counts: v}, v: "u8[0..3]"}}\n'
+    + 'messages:\n  log: {id: 5, fields: {n_1: {type: u8, counts: v_1}, a: "item[2]", v_1: "u8[0..3]"}}\n',
     "a count that a value adds, which C did not cover by the check value": _COUNTED.replace(
         "0..40}", "0..40}\n    crc: {type: u8, algorithm: sum8, over: [code, data]}"
     )

@@ -26,6 +26,7 @@ from qlinkgen.plan.payload import (
     by_choice,
     deciding,
     holders,
+    nested,
     renamed,
     renamed_tests,
 )
@@ -107,7 +108,7 @@ class _Sizer:
 
     def _records(self, step: RecordStep | RecordsStep, *, present: bool) -> list[str]:
         """Statements for walked records; some of them are in the minimum of what is ``present``."""
-        own, suffix = step.record.payload, f"_{self._depth + 1}"
+        own, suffix = step.record.payload, nested(self._depth + 1)
         if isinstance(step, RecordStep):
             more = [] if present else [f"*size += {own.least}U;"]
             return ["{", *_indented(self._inside(step, suffix, more)), "}"]

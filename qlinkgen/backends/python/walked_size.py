@@ -24,6 +24,7 @@ from qlinkgen.plan.payload import (
     by_choice,
     deciding,
     holders,
+    nested,
     renamed,
     renamed_tests,
 )
@@ -86,7 +87,7 @@ class _Measure:
 
     def _records(self, step: RecordStep | RecordsStep, *, present: bool) -> list[str]:
         """The statements for walked records; some of them are in the minimum of what is ``present``."""
-        own, suffix = step.record.payload, f"_{self._depth + 1}"
+        own, suffix = step.record.payload, nested(self._depth + 1)
         if isinstance(step, RecordStep):
             more = [] if present else [f"size += {own.least}"]
             inner = _Measure(bounded=True, depth=self._depth + 1)
