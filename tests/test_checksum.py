@@ -324,3 +324,9 @@ def test_another_start() -> None:
         assert checksum.begun(find(name), init).check == value
     with pytest.raises(ValueError, match="init does not fit into 8 bits"):
         checksum.begun(find("sum8"), 256)
+
+
+def test_a_start_of_fletcher_is_that_of_its_residues() -> None:
+    """So that empty data has the same value in every implementation."""
+    assert checksum.begun(find("fletcher-16"), 0xFFFF) == find("fletcher-16")
+    assert checksum.begun(find("adler-32"), 0xFFFFFFFF).init == zlib.adler32(b"", 0xFFFFFFFF)

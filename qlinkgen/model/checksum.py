@@ -211,6 +211,8 @@ def begun(algorithm: Checksum, init: int) -> Checksum:
     """
     if not 0 <= init <= algorithm.mask:
         raise ValueError(f"init does not fit into {algorithm.width} bits")
+    if isinstance(algorithm, Fletcher):
+        init = algorithm.reduced(init)
     if init == algorithm.init:
         return algorithm
     name = f"{algorithm.name}/init-{init:x}"

@@ -147,6 +147,11 @@ class Fletcher(_Register):
         low = ((register & (1 << self.half) - 1) + byte) % self.modulus
         return ((register >> self.half) + low) % self.modulus << self.half | low
 
+    def reduced(self, register: int) -> int:
+        """Return both sums modulo their number, as they are after any byte."""
+        low = register & (1 << self.half) - 1
+        return (register >> self.half) % self.modulus << self.half | low % self.modulus
+
 
 #: Every check value that `find` knows and that is not a CRC.
 SUMS: tuple[Sum | Xor | Fletcher, ...] = (
