@@ -211,6 +211,11 @@ commands:
     "a field called like a number of a record, which hid it where the size is measured": _COUNTED
     + 'types:\n  item: {fields: {n: {type: u8, counts: v}, v: "u8[0..3]"}}\n'
     + 'messages:\n  log: {id: 5, fields: {n_1: {type: u8, counts: v_1}, a: "item[2]", v_1: "u8[0..3]"}}\n',
+    "records beside one whose default is long, for which no vector could be made": _PARTS
+    + _BUS
+    + "types:\n  block: {fields: {a: u64, b: u64}}\n"
+    "  item: {fields: {k: u8, v: {switch: k, cases: {0: {a: u64, b: u64}}, default: u8}}}\n"
+    'messages:\n  log: {id: 5, fields: {n: {type: u8, counts: m}, m: "block[0..2]", i: "item[1]"}}\n',
     "a count that a value adds, which C did not cover by the check value": _COUNTED.replace(
         "0..40}", "0..40}\n    crc: {type: u8, algorithm: sum8, over: [code, data]}"
     )

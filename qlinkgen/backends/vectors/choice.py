@@ -171,13 +171,10 @@ def _fitting_frame(plan: PayloadPlan, values: dict[str, Raw]) -> dict[str, Raw]:
                 values = {**values, step.name: [defaults(step.record.payload) for _ in records]}
         elif isinstance(step, RecordStep) and records is not None and _is_too_long(plan, values):
             values = {**values, step.name: defaults(step.record.payload)}
+    walked = [segment.records for segment in plan.segments]
     for run in plan.runs:
         given = values[run.name]
-        if (
-            isinstance(run, BytesStep | ItemsStep)
-            and _is_too_long(plan, values)
-            and isinstance(given, bytes | list)
-        ):
+        if run not in walked and isinstance(given, bytes | list) and _is_too_long(plan, values):
             values = {**values, run.name: given[: run.length.minimum]}
     return values
 
