@@ -24,7 +24,16 @@ from qlinkgen.plan.describe import (
     value_text,
 )
 from qlinkgen.plan.ends import ByLength, ByMark
-from qlinkgen.plan.parts import BlocksPart, CellPart, CheckPart, ConstantPart, EqualPart, LengthPart, MarkPart
+from qlinkgen.plan.parts import (
+    BlocksPart,
+    CellPart,
+    CheckPart,
+    ConstantPart,
+    EqualPart,
+    IdPart,
+    LengthPart,
+    MarkPart,
+)
 from qlinkgen.plan.payload import ConstantStep, FilledStep, Member, Step
 from qlinkgen.plan.spans import Dissection, Fault, Rule
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
@@ -116,6 +125,12 @@ def _beginning(found: Dissection, fault: Fault) -> Words:
         other = end.end_id if isinstance(end, MarkPart) else 0
         rule = f"no byte with 0x{fault.of.marker:02X} set and {fault.of.id_name} other than {other}"
         return f"header missing: {rule}", "the capture began late, or the header was lost"
+    if isinstance(fault.of, IdPart):
+        known = " or ".join(each.hex(" ") for each in fault.of.starts)
+        return (
+            f"{fault.of.name} missing: it is {known}",
+            "the capture began late, or noise precedes the frame",
+        )
     preamble = found.frame.envelope.preamble.hex(" ")
     cause = "the capture began late, or a byte of the preamble was lost"
     return f"preamble {preamble} missing", cause

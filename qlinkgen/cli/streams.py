@@ -235,7 +235,7 @@ def _ends_alike(frame: FramePlan) -> bool:
         case ByKind():
             return all(map(_ends_alike, frame.kinds))
         case ByLength() | ByTerminator():
-            return bool(frame.envelope.preamble)
+            return bool(frame.envelope.starts)
         case ByMark() | BySilence():
             return True
         case ByMessage():

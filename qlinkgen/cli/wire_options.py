@@ -135,8 +135,8 @@ def echo_mode(protocol: Protocol, given: str | None) -> EchoMode:
     """Return the given mode; else a probe, unless its bytes could begin a frame."""
     if given is not None:
         return cast(EchoMode, given)
-    preambles = [each.envelope.preamble for each in frame_plan(protocol.frame).every]
-    told = all(preamble and not preamble.startswith(PROBE[:1]) for preamble in preambles)
+    kinds = [each.envelope.starts for each in frame_plan(protocol.frame).every]
+    told = all(starts and not any(each.startswith(PROBE[:1]) for each in starts) for starts in kinds)
     return "auto" if told else "none"
 
 

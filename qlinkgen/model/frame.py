@@ -96,7 +96,7 @@ class PartBits:
     shift: int
     bits: int
     at: int = 0
-    #: Legal values of a constant; the first is sent.
+    #: Legal values of a constant, the first of which is sent; the ids that a kind of frame begins with.
     constants: tuple[int, ...] = ()
     #: The value for each direction.
     directions: Mapping[str, int] = field(default_factory=dict)
@@ -289,6 +289,28 @@ class DelimitedFrame:
     def preamble(self) -> bytes:
         """Constant bytes at the start, b"" if there are none."""
         return self.parts[0].constant
+
+    @property
+    def leading(self) -> PartBits | None:
+        """The message id if a frame begins with all of it, else None."""
+        first = self.parts[0]
+        whole = first.role == "message" and first.bits == self.id_bits
+        return first.bits[0] if whole else None
+
+    @property
+    def starts(self) -> tuple[bytes, ...]:
+        """The bytes that frames begin with: a constant, or each id; () if any may."""
+        first = self.parts[0]
+        if self.leading is None or first.scalar is None:
+            return (first.constant,) if first.constant else ()
+        return tuple(map(first.scalar.integer.pack, self.leading.constants))
+
+    @property
+    def complemented(self) -> bool:
+        """Whether a frame is a byte and its complement."""
+        found = [part.derivation for part in self.parts if part.derivation and part.size == 1]
+        inverted = any(each.inverted and not each.added for each in found)
+        return inverted and sum(part.size for part in self.parts) + self.payload.max_size == _PAIR
 
     @cached_property
     def length_bias(self) -> int:

@@ -585,10 +585,16 @@ def _after_text(way: FrameStuffing) -> str:
     return way.rule.after.hex(" ").upper()
 
 
+def _start_text(kind: FramePlan) -> str:
+    """What frames of a kind begin with, "" if any bytes."""
+    ids = "the message ids" if kind.envelope.starts else ""
+    return kind.envelope.preamble.hex(" ").upper() or ids
+
+
 def receiver_text(frame: FramePlan) -> tuple[str, str]:
     """The strategy of a receiver, and its reason."""
     way = frame.receiver
-    preamble = " or ".join(each.envelope.preamble.hex(" ").upper() for each in frame.every)
+    preamble = " or ".join(each for kind in frame.every if (each := _start_text(kind)))
     match way:
         case Hunt():
             return "hunt", (

@@ -61,7 +61,7 @@ def dissect(plan: Plan, wire: bytes, direction: Direction, request: bytes = b"")
 
 def _kind_of(frame: FramePlan, wire: bytes) -> FramePlan:
     """The kind of the frame, or else the one of which the bytes hold the first beginning."""
-    kinds = [(each.envelope.preamble, each) for each in frame.kinds]
+    kinds = [(first, each) for each in frame.kinds for first in each.envelope.starts]
     begun = (each for first, each in kinds if first.startswith(wire[: len(first)]))
     held = [(at, each) for first, each in kinds if (at := wire.find(first)) >= 0]
     return next(begun, min(held, key=lambda each: each[0])[1] if held else frame.every[0])
@@ -169,6 +169,13 @@ class _Walk:
                 if start < 0:
                     self._lost(first)
                     return tuple(others[: self.envelope.payload_at - 1])
+            case IdPart() if first.numbers and self.kind == "frame":
+                found = [at for each in first.starts if (at := self.wire.find(each)) >= 0]
+                if not found:
+                    self._fault("frame", Rule.BEGINNING, 0, first)
+                    self._around(Around.BEFORE, range(len(self.wire)), "frame")
+                    return None
+                start = min(found)
             case MarkPart():
                 heads = (at for at, byte in enumerate(self.wire) if self._is_header(first, byte))
                 start = next(heads, -1)

@@ -113,6 +113,12 @@ class Envelope:
         first = self.parts[0]
         return first.data if isinstance(first, ConstantPart) else b""
 
+    @cached_property
+    def starts(self) -> tuple[bytes, ...]:
+        """The bytes that a frame may begin with: a constant, or each message id; () if any."""
+        first = self.parts[0] if self.parts else None
+        return first.starts if isinstance(first, ConstantPart | IdPart) else ()
+
     @property
     def length(self) -> LengthPart | None:
         """The length that each frame has, None if there is none."""

@@ -371,7 +371,7 @@ def _integer_part(frame: DelimitedFrame, part: StatedPart, transparency: Transpa
     assert part.scalar is not None
     integer = part.scalar.integer
     if part.role == "message" and part.bits == frame.id_bits:
-        return IdPart(part.name, integer)
+        return IdPart(part.name, integer, part.bits[0].constants)
     if part.role == "address":
         return AddressPart(part.name, integer)
     if part.bits:
@@ -408,7 +408,7 @@ def _receiver(envelope: Envelope, transparency: Transparency, *, directed: bool)
     if not directed and isinstance(transparency, FrameStuffing) and _unique(envelope, transparency):
         return Hunt(transparency.rule.after[0], transparency.rule.insert)
     return Rescan(
-        bare=not envelope.preamble,
+        bare=not envelope.starts,
         verified=bool(envelope.checks or envelope.blocks),
         seeded=bool(envelope.seeded),
     )

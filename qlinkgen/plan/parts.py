@@ -22,6 +22,11 @@ class ConstantPart:
         """Bytes before stuffing."""
         return len(self.data)
 
+    @property
+    def starts(self) -> tuple[bytes, ...]:
+        """What a frame may begin with if this is its first part."""
+        return (self.data,)
+
 
 @dataclass(frozen=True, slots=True)
 class _IntegerPart:
@@ -65,7 +70,17 @@ class LengthPart(_IntegerPart):
 
 @dataclass(frozen=True, slots=True)
 class IdPart(_IntegerPart):
-    """The number of the message."""
+    """The number of the message.
+
+    ``numbers`` are those that a kind of frame begins with, () if other parts tell a frame.
+    """
+
+    numbers: tuple[int, ...] = ()
+
+    @property
+    def starts(self) -> tuple[bytes, ...]:
+        """What a frame may begin with if this is its first part, () if any bytes."""
+        return tuple(map(self.integer.pack, self.numbers))
 
 
 @dataclass(frozen=True, slots=True)

@@ -271,11 +271,11 @@ class FrameReader:
         """Take a part of the header; returns the value of a length, 0 for other parts."""
         match part:
             case ConstantPart():
-                taken.cells[part.name] = b""
-                for byte in part.data:
-                    taken.cells[part.name] += self._take(cursor, part, 1)
-                    if taken.cells[part.name][-1] != byte:
-                        raise NoFrame("frame", cursor.at - 1)
+                self._begin(cursor, part, part.starts, taken)
+                return 0
+            case IdPart() if part.numbers:
+                self._begin(cursor, part, part.starts, taken)
+                self._identify(taken)
                 return 0
             case LengthPart() | IdPart() | AddressPart() | CellPart() | EqualPart():
                 taken.cells[part.name] = self._take(cursor, part, part.size)
@@ -287,6 +287,15 @@ class FrameReader:
                 raise AssertionError(f"{part.name} is not a part of a header")
             case _:
                 assert_never(part)
+
+    def _begin(self, cursor: Cursor, part: Part, starts: Sequence[bytes], taken: Taken) -> None:
+        """Take the bytes of a constant, or of one of several."""
+        seen = b""
+        while len(seen) < part.size:
+            seen += self._take(cursor, part, 1)
+            if not any(each.startswith(seen) for each in starts):
+                raise NoFrame("frame", cursor.at - 1)
+        taken.cells[part.name] = seen
 
     def _check_header(self, cursor: Cursor, taken: Taken) -> None:
         """Verify the check values of the header: a receiver does not wait for a payload of a wrong length."""

@@ -183,9 +183,9 @@ class RescanningReceiver(Receiver):
         assert isinstance(self.frame.receiver, Rescan)
         self._strategy = self.frame.receiver
         self._reader = frame_reader(self.frame, self.known)
-        preambles = [each.envelope.preamble for each in self.frame.every]
+        starts = [each.envelope.starts for each in self.frame.every]
         #: The bytes with which a frame may begin, b"" if any may.
-        self._first = b"".join(each[:1] for each in preambles)
+        self._first = b"".join(each[:1] for kind in starts for each in kind)
         self._longest = self.frame.longest
         self._buffer, self._skipped, self._due = b"", b"", b""
         end = self.frame.end

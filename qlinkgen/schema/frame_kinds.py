@@ -66,12 +66,26 @@ def build_kinds(file: SchemaFile, builder: FrameBuilder, report: Reporter) -> Fr
     checker = _Checker(report)
     for each in found:
         checker.kind(each)
-    checker.starts(found)
     checker.addresses(found)
     checker.values(found)
     for family in range(len(families)):
         checker.family([each for each in found if each.family == family])
     return kinds
+
+
+def begun(kinds: FrameKinds, messages: list[Message], report: Reporter) -> FrameKinds:
+    """The kinds, of which those that begin with the message id know its numbers; checks how they begin."""
+    found = []
+    for kind in kinds.kinds:
+        if kind.frame.leading is not None:
+            carried = (each.id for each in messages if kind in kinds.carrying(each.id))
+            numbers = tuple(sorted({number - kinds.base(kind.family) for number in carried}))
+            first = kind.frame.parts[0]
+            first = replace(first, bits=(replace(first.bits[0], constants=numbers),))
+            kind = replace(kind, frame=replace(kind.frame, parts=(first, *kind.frame.parts[1:])))  # noqa: PLW2901
+        found.append(kind)
+    _Checker(report).starts(found)
+    return FrameKinds(tuple(found))
 
 
 def family_frame(kinds: FrameKinds, family: int) -> DelimitedFrame:
@@ -100,13 +114,14 @@ def check_used(kinds: FrameKinds, messages: list[Message], report: Reporter) -> 
                 hint = "let only responses and replies have this kind, or give it the address"
                 report.error(_RULE, ("frames", kind.name), what, hint, of_key=True)
         size = sum(part.size for part in kind.frame.parts) + kind.frame.payload.max_size
-        if size > _SHORT or kind.frame.part("checksum"):
+        if size > _SHORT or kind.frame.part("checksum") or kind.frame.complemented:
             continue
         for message in messages:
             if message.direction != "response" and kind in kinds.carrying(message.id):
                 counted = f"{size} byte{'s' if size > 1 else ''}"
                 what = f"{message.name} is not an answer, and its frame of {counted} has no check value"
-                hint = "any byte of noise may be one; only a response or a reply has such a frame"
+                hint = "any byte of noise may be one; only a response or a reply has such a frame, or one "
+                hint += "that is a byte and its complement"
                 report.error("short-frame", ("frames", kind.name), what, hint, of_key=True)
 
 
@@ -135,10 +150,15 @@ class _Checker:
     def kind(self, kind: FrameKind) -> None:
         """Check that a kind has only what kinds may have."""
         path: Path = ("frames", kind.name, "parts")
-        if not kind.frame.preamble:
-            first = kind.frame.parts[0].name
+        first = kind.frame.parts[0].name
+        if kind.frame.leading is not None:
+            if kind.frame.part("terminator"):
+                what = f"{kind.name} begins with its message id and ends with a terminator"
+                self._error((*path, first), what, "begin it with a constant, or give it a length")
+        elif not kind.frame.preamble:
             what = f"{kind.name} begins with {first}, not with constant bytes"
-            self._error((*path, first), what, "begin each kind with a constant that tells it from the others")
+            hint = "begin each kind with a constant that tells it from the others, or with the message id"
+            self._error((*path, first), what, hint)
         if kind.frame.idle:
             what = f"an idle line ends frames of {kind.name}"
             self._error(path, what, "remove it; a length or the message gives the end of a kind of frame")
@@ -159,11 +179,13 @@ class _Checker:
         """Check that no kind begins like another."""
         for index, kind in enumerate(kinds):
             for other in kinds[:index]:
-                one, two = kind.frame.preamble, other.frame.preamble
-                if one and two and (one.startswith(two) or two.startswith(one)):
-                    first, second = (each.hex(" ").upper() for each in (one, two))
+                pairs = itertools.product(kind.frame.starts, other.frame.starts)
+                alike = (each for each in pairs if each[0].startswith(each[1]) or each[1].startswith(each[0]))
+                if (same := next(alike, None)) is not None:
+                    first, second = (each.hex(" ").upper() for each in same)
                     what = f"{kind.name} begins with {first}, {other.name} with {second}"
-                    hint = "a receiver cannot tell them apart; use other constants"
+                    ids = kind.frame.leading or other.frame.leading
+                    hint = f"a receiver cannot tell them apart; use other constants{' or ids' if ids else ''}"
                     self._error(("frames", kind.name), what, hint)
 
     def addresses(self, kinds: list[FrameKind]) -> None:

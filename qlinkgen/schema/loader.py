@@ -17,7 +17,7 @@ from qlinkgen.schema.commands import CommandBuilder, build_bus
 from qlinkgen.schema.echoes import check_echoes
 from qlinkgen.schema.examples import build_examples
 from qlinkgen.schema.fields import FieldBuilder
-from qlinkgen.schema.frame_kinds import build_kinds, check_kind_names, check_used
+from qlinkgen.schema.frame_kinds import begun, build_kinds, check_kind_names, check_used
 from qlinkgen.schema.frames import FrameBuilder, payload_bounds
 from qlinkgen.schema.including import include
 from qlinkgen.schema.kind_messages import message_builder
@@ -167,6 +167,7 @@ def _build(
     commands.build()
     if isinstance(frame, FrameKinds):
         check_used(frame, commands.messages, report)
+        frame = begun(frame, commands.messages, report)
     check_echoes(file, commands.commands, messages.places, report)
     check_terminator(frame, commands.messages, report)
     types.report_unused()

@@ -225,7 +225,7 @@ _ALL = (
     ),
     Rule(
         "bad-kinds",
-        "Kinds of frame begin with constants that tell them apart, and each message knows its kind.",
+        "Constants or message ids at their beginning tell kinds of frame apart; each message knows its kind.",
         "A receiver tries each kind where one may begin. Kinds have no idle line, stuffing, coding, trim "
         "or blocks, and do not end with the bytes that they begin with. A value or a counter of several "
         "kinds is the same in all. A message without frame travels in the kinds that no message names, "
@@ -234,7 +234,7 @@ _ALL = (
     ),
     Rule(
         "short-frame",
-        "A frame of one or two bytes without a check value is an answer.",
+        "A frame of one or two bytes is an answer, or has a check value, or is a byte and its complement.",
         "Noise contains every byte. Who waits for an answer knows when one may come.",
     ),
     Rule(

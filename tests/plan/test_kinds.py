@@ -170,3 +170,57 @@ def test_lines_and_packets_share_a_stream() -> None:
         assert [fault.kind for fault in dissect(plan, wire, "message").faults] == []
     with pytest.raises(BadFrame, match="length"):
         codec.decode(b"$*", "message")
+
+
+_LED = """\
+qlinkgen: 1
+protocol: {name: sample, revision: "1", source: Made up}
+byteorder: big
+frames:
+  command: {parts: {code: {role: message, type: u8}, inverse: {type: u8, equals: ~code}}}
+  data:
+    parts:
+      code: {role: message, type: u16}
+      data: {role: payload, size: 0..9}
+      sum: {type: u8, algorithm: sum8, over: [code, data]}
+  ack: {parts: {byte: 79}}
+bus: {kind: master_slave}
+defaults: {frame: command, addressing: none, repeat: safe}
+messages: {ack: {frame: ack, direction: response, fields: {}}}
+commands:
+  get: {id: 0x00, request: {}, response: {frame: data, id: 0x8001, fields: {value: u16}}}
+  go: {id: 0x11, request: {}, response: ack}
+"""
+
+
+def led() -> Plan:
+    protocol, faults = loads(_LED, "sample.yaml")
+    assert protocol is not None, faults
+    return plan_of(protocol)
+
+
+def test_a_kind_may_begin_with_its_message_id() -> None:
+    plan = led()
+    codec = Codec(plan)
+    assert codec.wrap("go.request", b"") == bytes.fromhex("11 EE")
+    wire = codec.wrap("get.response", b"\x12\x34")
+    assert wire == bytes.fromhex("80 01 12 34 C7")
+    assert codec.decode(wire, "response").message.name == "get.response"
+    stream = bytes.fromhex("80 11 80 11 ED 00 FF 79 80 02") + wire + b"\x79"
+    assert heard(plan, stream) == [("unknown", 5), ("ack", 7), ("get.response", 10), ("ack", 15)]
+
+
+@pytest.mark.parametrize(
+    ("wire", "kind"),
+    [("11", "truncated"), ("11 11", "frame"), ("22 DD", "frame"), ("80", "truncated"), ("80 02", "frame")],
+)
+def test_only_known_ids_begin_a_frame(wire: str, kind: str) -> None:
+    plan = led()
+    with pytest.raises(BadFrame) as caught:
+        Codec(plan).decode(bytes.fromhex(wire), "request")
+    assert caught.value.kind == kind
+    module = load_codec(plan.protocol)
+    with pytest.raises(module.DecodeError) as refused:
+        module.decode_request(bytes.fromhex(wire))
+    assert refused.value.kind == kind
+    assert dissect(plan, bytes.fromhex(wire), "request").kind == kind

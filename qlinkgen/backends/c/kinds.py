@@ -45,6 +45,7 @@ class KindView:
         unused: parameters that the function that wraps does not use.
         get_values: statements that read the values of a received frame.
         own: what the names of its functions begin with.
+        starts: rows of the message ids that its frames begin with, [] if a constant begins them.
         ended: its terminator, None without one; then ``frame`` and ``whole`` are views for its template.
     """
 
@@ -66,6 +67,12 @@ class KindView:
     most: int
     parts: PartsView
     plain: PlainView
+    starts: Sequence[str]
+
+    @property
+    def start_size(self) -> int:
+        """Size of each message id that its frames begin with."""
+        return self.starts[0].count("0x")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,18 +115,21 @@ def kinds_views(plan: Plan, layouts: Layouts) -> KindsViews:
         ),
         parts=replace(
             first,
-            judged=_unproven(plan.frame),
+            judged=_unproven(plan.frame, plan.protocol.name),
             index_type=unsigned_type(max(16, plan.frame.max_wire.bit_length())),
             max_frame=f"{plan.frame.longest}U",
         ),
     )
 
 
-def _unproven(frame: FramePlan) -> str:
+def _unproven(frame: FramePlan, prefix: str) -> str:
     """The condition for a received frame of a kind without check value, "" if all have one."""
     terms = []
     for kind in frame.kinds:
-        if not kind.envelope.checks:
+        if not kind.envelope.checks and not kind.envelope.preamble:
+            held = "&receiver->wire[receiver->first], (size_t)receiver->filled - receiver->first"
+            terms.append(f"{prefix}_begins_{kind.name}_({held})")
+        elif not kind.envelope.checks:
             offsets = ["", *(f" + {at}U" for at in range(1, len(kind.envelope.preamble)))]
             tests = [
                 f"(receiver->wire[receiver->first{offset}] == {in_hex(byte)})"
@@ -180,7 +190,12 @@ def _kind(
         most=kind.max_payload,
         parts=parts,
         plain=plain_view(writer, frame.pass_decode_direction),
+        starts=[] if kind.envelope.preamble else [_row(start) for start in kind.envelope.starts],
     )
+
+
+def _row(start: bytes) -> str:
+    return f"{{{', '.join(map(in_hex, start))}}}"
 
 
 def _carries(frame: FramePlan, kind: FramePlan, bits: int) -> str:

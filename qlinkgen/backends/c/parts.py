@@ -175,6 +175,9 @@ class PartWriter(CheckWriter):
                     yield f"if ({reached}{end}U) {{"
                     yield from (f"    {line}" for line in self._announced(part, all_there=all_there))
                     yield "}"
+                case IdPart() if part.numbers:
+                    test = f"!{self.prefix}_begins_{self.frame.name}_(body, {counted})"
+                    yield from refusal(test, f"{self.prefix.upper()}_ERROR_FRAME")
                 case IdPart() | AddressPart() | CellPart() | EqualPart():
                     yield from self._number_checks(part, f"{reached}{end}U", directed)
                 case CheckPart():

@@ -45,7 +45,7 @@ def noise(plan: Plan) -> tuple[bytes, ...]:
         case Hunt() | Rescan():
             # One byte more must not complete a frame.
             long = [each for each in envelopes if len(envelopes) == 1 or each.overhead > each.header_size + 1]
-            preambles = [each.preamble for each in long]
+            preambles = [each.starts[0] if each.starts else b"" for each in long]
             begun = [each + b"\x00" for each in preambles]
             return tuple(dict.fromkeys((b"\x00\xff", *(each[:1] for each in preambles), b"", *begun)))
         case Marks():

@@ -19,6 +19,14 @@ class AnyKind(Frame):
 
     base = 0
     least = 0
+    #: The message ids that its frames begin with, () if a constant begins them.
+    starts: Sequence[bytes] = ()
+
+    def begins(self, wire: bytes) -> bool:
+        """Whether one of its frames may begin with the first of these bytes."""
+        first = self.parts[0]
+        starts = [first.data] if isinstance(first, Constant) else self.starts
+        return any(each.startswith(wire[: len(each)]) for each in starts)
 
     def _number(self, message: Message) -> int:
         return message.id - self.base
@@ -39,8 +47,10 @@ class Kind(AnyKind, DelimitedFrame):
         base: int = 0,
         least: int = 0,
         address: str = "",
+        starts: Sequence[bytes] = (),
     ) -> None:
         super().__init__(parts, messages, address=address)
+        self.starts = starts
         self.by_id = {each.id - base: each for each in self.by_name.values()}
         self.base = base
         self.least = least
@@ -76,9 +86,6 @@ class Kinds(Frame):
 
     def _frame(self, wire: bytes, request: bytes) -> Container:
         for kind in self.kinds:
-            first = kind.parts[0]
-            if isinstance(first, Constant) and first.data.startswith(
-                wire[: len(first.data)]
-            ):
+            if kind.begins(wire):
                 return kind._frame(wire, request)
         raise FrameError("frame", f"no kind of frame begins with {wire[:1].hex()}")

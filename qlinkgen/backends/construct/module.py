@@ -214,6 +214,7 @@ def _kinds(plan: Plan, direction: Direction, messages: Mapping[str, str]) -> Cal
         settings: dict[str, Node] = {"base": hexadecimal(kind.base)} if kind.base else {}
         settings |= {"least": kind.envelope.payload.least} if kind.envelope.payload.least else {}
         settings |= {"address": record_key(kind.address)} if kind.address else {}
+        settings |= {} if kind.envelope.preamble else {"starts": kind.envelope.starts}
         name = "EndedKind" if kind.whole else "Kind"
         if kind.whole:
             settings |= dict(_ended_at(kind))

@@ -69,6 +69,8 @@ class KindView:
         ended: its terminator, None without one.
         least: minimum size of its payload.
         most: maximum size of it.
+        lead: the constant that it begins with, b"" if that is the message id.
+        begun: the message ids that it begins with, and the beginnings of these.
     """
 
     name: str
@@ -95,6 +97,7 @@ class KindView:
     least: int
     most: int
     lead: str
+    begun: Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -164,7 +167,8 @@ def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
     for frame in sorted(plan.frame.kinds, key=lambda each: each.max_payload):
         families.setdefault(frame.base, []).append((frame.max_payload, views[frame.name], frame.base))
     for frame in plan.frame.kinds:
-        firsts.setdefault(frame.envelope.preamble[0], []).append(views[frame.name])
+        for first in dict.fromkeys(start[0] for start in frame.envelope.starts):
+            firsts.setdefault(first, []).append(views[frame.name])
     nodes = plan.protocol.bus.nodes
     name = plan.frame.address
     address = AddressNames(address_attribute(name), address_argument(name), nodes[0] if nodes else 0)
@@ -223,7 +227,8 @@ def _kind(frame: FramePlan, plan: Plan, make: Maker) -> KindView:
         header=envelope.header_size,
         trailer=envelope.trailer_size,
         overhead=envelope.overhead,
-        head_tests=list(_head_tests(envelope)),
+        head_tests=list(_head_tests(envelope, frame.name)),
+        begun=list(_begun(envelope)),
         size=_size(frame, envelope),
         tail_tests=[test for part in envelope.back for test in _tail_tests(envelope, part)],
         number_in_head=base + _grouped(pieces.number(envelope, envelope.id, "head"), base),
@@ -383,13 +388,15 @@ def _bytes(part: Part) -> str:
 # Reading a frame
 
 
-def _head_tests(envelope: Envelope) -> Iterator[tuple[str, str]]:
+def _head_tests(envelope: Envelope, name: str) -> Iterator[tuple[str, str]]:
     """The checks of a header, part by part, as far as received."""
     for part in envelope.front:
         start, end = envelope.offset(part), envelope.offset(part) + part.size
         match part:
             case ConstantPart():
                 yield f"not {literal(part.data)}.startswith(head[{start}:{end}])", '"no_frame", start'
+            case IdPart() if part.numbers:
+                yield f"head[:{end}] not in _BEGUN_{name.upper()}", '"no_frame", start'
             case LengthPart():
                 seen = pieces.read(envelope, part, "head")
                 yield (
@@ -405,6 +412,13 @@ def _head_tests(envelope: Envelope) -> Iterator[tuple[str, str]]:
                 raise AssertionError(f"{part.name} is not a part of a header")
             case _:
                 assert_never(part)
+
+
+def _begun(envelope: Envelope) -> Iterator[str]:
+    """The message ids that frames begin with, as far as received; none if a constant begins them."""
+    if not envelope.preamble:
+        sizes = range(1, len(envelope.starts[0]) + 1)
+        yield from map(literal, sorted({start[:size] for start in envelope.starts for size in sizes}))
 
 
 def _tail_tests(envelope: Envelope, part: Part) -> Iterator[str]:

@@ -87,6 +87,35 @@ def draw(rng: random.Random) -> Kinds:
     return Kinds({name: frames[name] for name in mixed}, families)
 
 
+def lead_with_ids(rng: random.Random, several: Kinds) -> None:
+    """Let one kind begin with its message id, if no other kind then begins like it."""
+    for family in rng.sample(several.families, len(several.families)):
+        parts = several.frames[family.name]["parts"] if family.name else {}
+        code = parts.get("code", {})
+        if code.get("role") != "message" or "group" in parts or family.ended or rng.random() < 0.1:
+            continue
+        size = int(code["type"][1:]) // 8
+        starts = {number.to_bytes(size, "big")[:1] for number in family.ids}
+        starts |= {number.to_bytes(size, "little")[:1] for number in family.ids}
+        others = [each["parts"] for name, each in several.frames.items() if name != family.name]
+        if any(bytes.fromhex(next(iter(each.values())))[:1] in starts for each in others):
+            continue
+        del parts["start"]
+        rest = {name: spec for name, spec in parts.items() if name != "code"}
+        for spec in (each for each in rest.values() if isinstance(each, dict)):
+            for key in ("over", "counts"):
+                if isinstance(spec.get(key), list):
+                    seeds = [name for name in spec[key] if name.startswith("attribute.")]
+                    spec[key] = [name for name in ("code", *rest) if name in spec[key]] + seeds or ["code"]
+        parts.clear()
+        parts |= {"code": code, **rest}
+        if not family.shape.most and size == 1 and not {*rest} - {"crc", "also", "second", "stop"}:
+            parts.clear()
+            parts |= {"code": code, "inverse": {"type": "u8", "equals": "~code"}}
+            family.shape.seeds = {}
+        return
+
+
 def _ended(rng: random.Random, lead: str) -> Shape:
     """A kind of frame with a terminator, which no text holds."""
     parts: Doc = {"start": lead, "code": {"role": "message", "type": "u8"}}

@@ -100,6 +100,7 @@ class _Maker:
         document["bus"] = self._bus(shape)
         if several:
             document |= self._kinds(several, maker, document["bus"])
+            kinds.lead_with_ids(random.Random(f"ids {self.seed}"), several)
         else:
             document |= self._traffic(shape, maker, document["bus"])
         if shape.bus == "master_slave" and shape.master is None and self.seed % _LINK == 1:

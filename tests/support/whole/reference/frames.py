@@ -220,6 +220,9 @@ class Frame:
         self.bias -= length.spec.get("offset", 0) if length else 0
         #: Bytes of one step of the length.
         self.step = length.spec.get("scale", 1) if length else 1
+        first = self.parts[0]
+        #: What a frame begins with: a constant, or each id that a kind has; () for others.
+        self.starts: tuple[bytes, ...] = (first.constant,) if first.role == "constant" else ()
         #: No leading constant: a candidate begins with a known message and a legal address.
         self.bare = self.parts[0].role != "constant" and not frame.get("silent")
         most, stuffing = self.most, self.stuffing
@@ -730,7 +733,9 @@ class Splitter:
         data, size = b"", part.size if self._frame.has(part, cut) else 0
         while len(data) < size:
             data += bytes([cursor.take(part)])
-            if part.role == "constant" and not part.constant.startswith(data):
+            known = self._frame.starts if part is self._frame.parts[0] else (part.constant,)
+            constant = part.role == "constant" or (part is self._frame.parts[0] and known)
+            if constant and not any(each.startswith(data) for each in known):
                 raise Refused("frame", cursor.at, told=False)
         cut[part.name] = data
 

@@ -12,7 +12,7 @@ from tests.support.whole.reference.frames import Frame, NeedMore, Refused
 from tests.support.whole.reference.layouts import Message
 from tests.support.whole.reference.notation import Direction, Doc, part_doc
 from tests.support.whole.reference.receivers import Event, Receiver, Searcher
-from tests.support.whole.reference.values import Raw, Wrong
+from tests.support.whole.reference.values import Raw, Wrong, put
 
 
 class Kinds:
@@ -27,6 +27,11 @@ class Kinds:
         self.shared = tuple(name for name in self.frames if name not in named)
         #: The largest payload of any kind.
         self.most = max(frame.most for frame in self.frames.values())
+        for name, frame in self.frames.items():
+            if not frame.starts:
+                carried = {each.number for each in self._messages() if name in each.frames}
+                frame.starts = tuple(put(frame.parts[0].pieces, number) for number in carried)
+                frame.bare = False
 
     def messages(self) -> Iterator[Message]:
         """All messages, in order."""
@@ -150,8 +155,7 @@ class KindSearcher(Receiver):
     def whole(self, wire: bytes) -> Event:
         """The event of bytes that are exactly one frame. Raises Wrong."""
         for each in self.searchers:
-            first = each.frame.parts[0].constant
-            if first.startswith(wire[: len(first)]):
+            if any(first.startswith(wire[: len(first)]) for first in each.frame.starts):
                 return each.whole(wire)
         raise Wrong("frame")
 
@@ -186,8 +190,7 @@ class KindSearcher(Receiver):
 
     def _attempt(self) -> tuple[Event, int]:
         for each in self.searchers:
-            first = each.frame.parts[0].constant
-            if first.startswith(self.buffer[: len(first)]):
+            if any(first.startswith(self.buffer[: len(first)]) for first in each.frame.starts):
                 each.buffer, each.start, each.at = self.buffer, self.start, self.at
                 event, size, _ = each.attempt()
                 return event, size
