@@ -99,11 +99,23 @@ _C_LOCALS = frozenset(
     listener frame checked request response body buffer start count raw sum crc payload_size
     payload_capacity total trailer covered head place broadcast context byte at direction
     parts received size_t block out turn due step texts length left found ended used extra
-    defaults seeds""".split()  # noqa: SIM905
+    defaults seeds before answers""".split()  # noqa: SIM905
 )
 #: Members of a table of handlers other than functions.
 _C_HANDLERS = frozenset(
-    {"node", "address", "broadcast", "context", "id", "parts", "received", "replying", "turn", "due"}
+    {
+        "node",
+        "address",
+        "before",
+        "broadcast",
+        "context",
+        "id",
+        "parts",
+        "received",
+        "replying",
+        "turn",
+        "due",
+    }
 )
 #: Names that the header itself defines, or their beginnings, without the prefix of the protocol.
 _C_STEMS = frozenset(

@@ -24,6 +24,8 @@ from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
 _RULE = "bad-many"
+#: Bits of the longest number that a program in C can compare.
+LONGEST = 64
 
 
 class ManyBuilder:
@@ -106,12 +108,19 @@ class ManyBuilder:
             self._error(path, what, "write by: FIELD, a field of the response with the node")
             return None
         if by is not None and by != self._address:
-            return ByEach(name, most, key, by) if self._number(by, self._response, "response", path) else None
+            return self._each_by(name, most, key, by, path)
         if self._addressing != "answered_broadcast":
             what = "only the node that was asked answers, whatever the list says"
             self._error(path, what, "write addressing: answered_broadcast, or by: FIELD of the response")
             return None
         return ByEach(name, most, key)
+
+    def _each_by(self, name: str, most: int, key: str, by: str, path: Path) -> Many | None:
+        kind = self._number(by, self._response, "response", path)
+        if kind is not None and kind.signed:
+            self._error((*path, "by"), f"{by} may be negative, which no node is", "use an unsigned number")
+            return None
+        return ByEach(name, most, key, by) if kind else None
 
     def _reply(self, name: str, path: Path) -> Many | None:
         if name in self._replies:
@@ -155,6 +164,7 @@ class ManyBuilder:
         if (
             isinstance(kind, Scalar)
             and kind.scaling is None
+            and kind.bits <= LONGEST
             and (kind.meaning is None or isinstance(kind.meaning, Enum))
         ):
             return kind
@@ -179,4 +189,5 @@ def _most_nodes(field: Field, key: str) -> int:
             kinds = {value.name: value.type for value in values_of(kind.layout.fields)}
             item = kinds.get(key)
     plain = isinstance(item, Scalar) and item.scaling is None and item.meaning is None
+    plain = plain and isinstance(item, Scalar) and not item.signed and item.bits <= LONGEST
     return kind.length.maximum if plain and isinstance(kind, Array | Records) else 0

@@ -273,13 +273,15 @@ def _macro_owners(
 
 
 def _step_owners(file: SchemaFile) -> Iterator[tuple[str, str, Sequence[str], Path]]:
-    """The same for dialogues."""
+    """The same for dialogues, and for several answers, which a master counts."""
     for name, path in step_messages(file):
         yield _class_base(file, snake(name)), f"the step '{name}'", (*_MESSAGE_MACROS, "turn"), path
     for name, spec in file.commands.items():
         place: Path = ("commands", name, "steps")
         if spec.steps is not None:
             yield name, f"the dialogue '{name}'", ("steps",), place
+        if spec.many is not None:
+            yield f"{name}_answers", f"the answers of '{name}'", ("init",), ("commands", name, "many")
         for index, step in enumerate(spec.steps or ()):
             if isinstance(step.send, str):
                 yield _class_base(file, step.send), f"the message '{step.send}'", ("turn",), (*place, index)

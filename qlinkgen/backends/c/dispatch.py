@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from qlinkgen.backends.c.framing import Address, Expected, Function, expected
 from qlinkgen.backends.c.names import Names, count_type, unsigned
+from qlinkgen.backends.c.several import Listed, listed_in
 from qlinkgen.model.fields import FieldType
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import handler, member, snake
@@ -40,6 +41,7 @@ class SlaveEntry:
         replies: functions of other answers.
         sizes: number of items of a field of the response, and the expression with which it begins.
         turn: its number in a dialogue, 0 if it begins a transaction; ``following`` is that of the next frame.
+        listed: the nodes in it, each of which sends an answer; None if it has no list.
     """
 
     name: str
@@ -59,6 +61,7 @@ class SlaveEntry:
     sizes: list[tuple[str, str]]
     turn: str
     following: str
+    listed: Listed | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,7 +225,14 @@ def _entry(
         sizes=_sizes(exchange.command if exchange else None, message, answer),
         turn=turn_name(names, message) if exchange and exchange.turn else "",
         following=turn_name(names, following) if following else "",
+        listed=_listed(exchange.command) if exchange and answer else None,
     )
+
+
+def _listed(command: Command) -> Listed | None:
+    """The nodes in a request of which each sends an answer of its own."""
+    each = command.each
+    return listed_in(command.request, each, "request.") if each and not each.by else None
 
 
 def _sizes(command: Command | None, sent: Message, answer: Message | None) -> list[tuple[str, str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import get_args
 
 import jinja2
@@ -21,6 +22,7 @@ from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.messages import Beside, MessageWriter, Rounding, nearest_helpers
 from qlinkgen.backends.c.names import Names
 from qlinkgen.backends.c.places import in_hex
+from qlinkgen.backends.c.several import several
 from qlinkgen.backends.c.sizes import SizeView, size_view, sized_by_message
 from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.backends.c.types import Kind, Types
@@ -277,6 +279,8 @@ class Header:
             transactions=dispatch.transactions(self._protocol, self._names.upper, commands),
             turns=dispatch.turns(self._names, self._protocol.exchanges.values(), self._kept),
             dialogues=dispatch.dialogues(self._names, commands) if listens else [],
+            before=max((each.listed for each in slave if each.listed), key=attrgetter("most"), default=None),
+            several=several(self._names, commands, self._kept) if listens else [],
         )
 
     def _slave(self) -> list[dispatch.SlaveEntry]:

@@ -142,7 +142,10 @@ class Entries:
 
     def _has_handler(self, message: MessagePlan) -> bool:
         """Whether a slave has a function for it."""
-        return "request" in self._plan.received_directions and message.direction != "response"
+        exchange = self._plan.protocol.exchanges.get(message.name)
+        each = exchange.command.each if exchange else None
+        listed = each is not None and not each.by  # whose node need not be in the list of a vector
+        return "request" in self._plan.received_directions and message.direction != "response" and not listed
 
     def _has_callback(self, message: MessagePlan) -> bool:
         """Whether a listener has a function for it."""
