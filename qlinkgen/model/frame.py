@@ -14,7 +14,7 @@ from qlinkgen.model.condition import Condition
 from qlinkgen.model.fields import Field, Value
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer, pack_chunks
 from qlinkgen.model.texts import Text
-from qlinkgen.model.types import Scalar
+from qlinkgen.model.types import Blob, Characters, Length, Scalar
 
 #: What the names of attributes begin with where a check value covers them.
 ATTRIBUTE = "attribute."
@@ -367,7 +367,7 @@ class DelimitedFrame:
         for part in self.parts:
             for bits in part.bits:
                 if bits.type is not None:
-                    value = Value(bits.name, bits.type, bits.doc or part.doc, part.field)
+                    value = Value(bits.name, _stated(bits.type), bits.doc or part.doc, part.field)
                     found.setdefault(bits.name, value)
         return tuple(found.values())
 
@@ -382,6 +382,15 @@ class DelimitedFrame:
         over = [name for part in self.parts if part.checksum for name in part.checksum.over]
         found = (name.removeprefix(ATTRIBUTE) for name in over if name.startswith(ATTRIBUTE))
         return tuple(dict.fromkeys(found))
+
+
+def _stated(number: Scalar) -> Scalar | Blob:
+    """The type of a value of every frame as its users see it: that of a text is like that of a field."""
+    kind = number.meaning
+    if not isinstance(kind, Characters):
+        return number
+    default = number.default.to_bytes(kind.number, "big")
+    return Blob(True, Length(kind.number, kind.number), default, excluded=kind.excluded)
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ __all__ = [
     "Bits",
     "Blob",
     "ByteOrder",
+    "Characters",
     "Checked",
     "Chunk",
     "Constant",
@@ -99,6 +100,34 @@ class Flags:
     def mask(self) -> int:
         """All named bits."""
         return sum(1 << member.value for member in self.members)
+
+
+@dataclass(frozen=True, slots=True)
+class Characters:
+    """Seven-bit characters, the first of which is the most significant byte of the integer.
+
+    A value of every frame; texts among the fields of a message are a `Blob`.
+    """
+
+    number: int
+    #: Characters that it does not have: those that end the frame.
+    excluded: bytes = b""
+
+    def allows(self, raw: int) -> bool:
+        """Whether an integer is a legal text."""
+        data = raw.to_bytes(self.number, "big")
+        return data.isascii() and not {*data} & {*self.excluded}
+
+    def text(self, raw: int) -> str:
+        """The characters of an integer."""
+        return raw.to_bytes(self.number, "big").decode("ascii")
+
+    def nearest(self, raw: int) -> int:
+        """The integer with other characters in the place of illegal ones."""
+        near = next(each for each in b" 0x_~!" + bytes(range(0x80)) if each not in self.excluded)
+        data = raw.to_bytes(self.number, "big")
+        legal = (each & 0x7F for each in data)
+        return int.from_bytes(bytes(near if each in self.excluded else each for each in legal), "big")
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +242,7 @@ class Scalar:
     role: Role = Settable()
     scaling: Scaling | None = None
     unit: Text = ""
-    meaning: Enum | Flags | Float | Literal["bool"] | None = None
+    meaning: Enum | Flags | Float | Characters | Literal["bool"] | None = None
     #: The named type of the field, "" if its type has no name. Not part of the layout.
     type_name: str = field(default="", compare=False)
 

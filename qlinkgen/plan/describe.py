@@ -11,6 +11,7 @@ from qlinkgen.model.condition import Test
 from qlinkgen.model.frame import Silence
 from qlinkgen.model.integer import Chunk, Integer
 from qlinkgen.model.types import (
+    Characters,
     Checked,
     Constant,
     Count,
@@ -40,7 +41,7 @@ from qlinkgen.plan.ends import (
     Marks,
     Rescan,
 )
-from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
+from qlinkgen.plan.expr import Clear, Condition, Legible, OneOf, Size, Term, Within
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
     AddressPart,
@@ -152,6 +153,8 @@ def value_text(scalar: Scalar, raw: int) -> str:
             return f"{bits} ({' | '.join(names) or 'none set'})"
         case "bool":
             return str(native_from_raw(scalar, raw)).lower()
+        case Characters():
+            return repr(raw.to_bytes(meaning.number, "big").decode("latin-1"))
         case Float() | None:
             unit = f" {scalar.unit}" if scalar.unit else ""
             raw_text = f" (raw {raw})" if scalar.scaling else ""
@@ -205,6 +208,8 @@ def _scalar_text(scalar: Scalar) -> str:
             return f"{meaning.name} (flags, {integer})"
         case Float():
             return f"{meaning.name}{integer.removeprefix(f'u{scalar.bits}')}"
+        case Characters():
+            return f"text[{meaning.number}]"
         case "bool":
             return "bool"
         case None:
@@ -369,6 +374,9 @@ def condition_text(rule: Condition) -> str:
             return f"bits 0x{rule.mask:X} clear"
         case OneOf():
             return " or ".join(map(condition_text, rule.ranges))
+        case Legible():
+            barred = rule.characters.excluded
+            return "7-bit characters" + (f" without {barred.decode('ascii')!r}" if barred else "")
         case _:
             assert_never(rule)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import gcd
 
 from qlinkgen.model.integer import packed_size
+from qlinkgen.model.types import Characters
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,4 +97,15 @@ class OneOf:
         return any(each.holds(number) for each in self.ranges)
 
 
-Condition = Within | Clear | OneOf
+@dataclass(frozen=True, slots=True)
+class Legible:
+    """The bytes of the number are legal characters."""
+
+    characters: Characters
+
+    def holds(self, number: int) -> bool:
+        """Whether the condition is true of a number."""
+        return self.characters.allows(number)
+
+
+Condition = Within | Clear | OneOf | Legible

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import assert_never
 
+from qlinkgen.model.types import Characters
 from qlinkgen.model.values import Native, native_from_raw
 from qlinkgen.plan.content import Raw
 from qlinkgen.plan.payload import (
@@ -27,7 +28,8 @@ def native_of(step: Holder, raw: Raw) -> Native:
     match step:
         case ValueStep() | Member():
             assert isinstance(raw, int)
-            return native_from_raw(step.number, raw)
+            kind = step.number.meaning
+            return kind.text(raw) if isinstance(kind, Characters) else native_from_raw(step.number, raw)
         case BytesStep(text=True):
             assert isinstance(raw, bytes)
             return raw.decode("ascii")

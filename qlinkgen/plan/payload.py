@@ -16,13 +16,14 @@ from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.condition import Test, turning_points
 from qlinkgen.model.integer import BitOrder, Integer
 from qlinkgen.model.types import (
+    Characters,
     Enum,
     Flags,
     Float,
     Length,
     Scalar,
 )
-from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
+from qlinkgen.plan.expr import Clear, Condition, Legible, OneOf, Size, Term, Within
 
 
 @dataclass(frozen=True, slots=True)
@@ -701,7 +702,8 @@ def _countable(count: CountStep) -> int:
 
 def conditions(number: Scalar) -> tuple[Condition, ...]:
     """Conditions on a received number, beyond the limits of its bits."""
-    return limits(number)[1:] if number.full_range else limits(number)
+    known = number.full_range and not isinstance(number.meaning, Characters)
+    return limits(number)[1:] if known else limits(number)
 
 
 def limits(number: Scalar) -> tuple[Condition, ...]:
@@ -709,6 +711,8 @@ def limits(number: Scalar) -> tuple[Condition, ...]:
     found: list[Condition] = [Within(number.minimum, number.maximum)]
     meaning = number.meaning
     match meaning:
+        case Characters():
+            return (Legible(meaning),)
         case Flags() if meaning.reserved_zero and (mask := number.integer.mask & ~meaning.mask):
             found.append(Clear(mask))
         case Float() if meaning.bounds is not None:

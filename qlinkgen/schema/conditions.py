@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from qlinkgen.model.condition import Condition, Test, exclusive, turning_points
 from qlinkgen.model.fields import Field, Layout, Record, Records, Value, values_of
-from qlinkgen.model.types import Array, Blob, Count, Enum, Float, Scalar
+from qlinkgen.model.types import Array, Blob, Characters, Count, Enum, Float, Scalar
 from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TestText, Wanted, shown
@@ -95,7 +95,7 @@ class ConditionBuilder:
             and kind.text is None
             and kind.integer.bits <= 64
         )
-        if not plain or (isinstance(kind, Scalar) and isinstance(kind.meaning, Float)):
+        if not plain or (isinstance(kind, Scalar) and isinstance(kind.meaning, Float | Characters)):
             what = f"what {field.slot} is" if field.slot else f"whether {field.name} is present"
             what = f"{text.field} cannot decide {what}"
             self._error(field.name, key, what, "name a whole number of up to 64 bits, an enum or a bool")

@@ -13,6 +13,7 @@ from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.part_conditions import PartConditions, check_conditions
 from qlinkgen.schema.part_directions import check_directions
+from qlinkgen.schema.part_texts import without_end
 from qlinkgen.schema.parties import with_parties
 from qlinkgen.schema.parts import PartBuilder
 from qlinkgen.schema.pieces import MAX_ID_BITS, placed
@@ -154,6 +155,7 @@ class FrameBuilder:
             self._check_stuffing(parts, path, alone=alone, coded=coded_as is not None)
             insert, names, after = build_stuffing(stuffed, parts, self._parts, self._report)
             coding = (insert,), names, after
+        parts = without_end(parts, coding[1] if coding[0] else (), path, self._report)
         resolved = with_parties(parts, self._file, path, self._report)
         if resolved is None:
             return None

@@ -8,10 +8,11 @@ from dataclasses import replace
 
 from qlinkgen.model.frame import Counting, DelimitedFrame, Frame, Part, PartBits
 from qlinkgen.model.message import Direction
-from qlinkgen.model.types import Bits, Float, Scalar, byte_chunks
+from qlinkgen.model.types import Bits, Blob, Float, Scalar, byte_chunks
 from qlinkgen.schema.file_fields import FieldSpec
 from qlinkgen.schema.file_frames import PartBitSpec, PartSpec
 from qlinkgen.schema.notation import NO_ID, StatedId, shown
+from qlinkgen.schema.part_texts import text_of
 from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.types import TypeBuilder
@@ -65,12 +66,14 @@ class PieceBuilder:
             case Scalar() if kind.settable and kind.meaning != "bool" and not isinstance(kind.meaning, Float):
                 number = self._number(name, 0, kind, spec.doc, path)
                 return _container(kind), (self._counted(number, spec, path),)
+            case Blob() if (text := text_of(kind)) is not None:
+                number = self._number(name, 0, text, spec.doc, path)
+                return _container(text), (self._counted(number, spec, path),)
             case _:
                 if kind is not None:
                     what = f"{shown(spec.type)} is not the type of a value of every frame"
-                    self._fault(
-                        "not-applicable", (*path, "type"), what, "use an integer, an enum, flags, or bits"
-                    )
+                    hint = "use an integer, an enum, flags, bits, or text[1..8]"
+                    self._fault("not-applicable", (*path, "type"), what, hint)
                 self._report.taint(path)
                 return _container(None), ()
 

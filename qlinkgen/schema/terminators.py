@@ -9,7 +9,7 @@ from qlinkgen.model.coding import ALL_BYTES, Alphabet
 from qlinkgen.model.fields import Field, Record, Records
 from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds, Part, PartBits
 from qlinkgen.model.message import Message
-from qlinkgen.model.types import Array, Bits, Blob, Chunk, Constant, Reserved, Scalar
+from qlinkgen.model.types import Array, Bits, Blob, Characters, Chunk, Constant, Reserved, Scalar
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 
@@ -129,6 +129,8 @@ def _numbers(bits: PartBits, chunk: Chunk, messages: Sequence[Message]) -> Itera
         return {message.id for message in messages}
     if bits.role == "constant":
         return bits.constants
+    if bits.type is not None and isinstance(text := bits.type.meaning, Characters):
+        return {each << chunk.shift for each in range(0x80) if each not in text.excluded}
     ranges = [each for message in messages for each in message.addresses]
     if bits.type is not None:
         ranges = [(bits.type.minimum, bits.type.maximum)]

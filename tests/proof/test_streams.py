@@ -59,7 +59,8 @@ def _shown(event: Any, protocol: Protocol) -> str:
     if not hasattr(event, "NAME"):
         return str(event.kind)
     address = getattr(event, protocol.address_name) if protocol.address_name else "-"
-    beside = [int(getattr(event, each.name)) for each in protocol.beside(protocol.by_name[event.NAME])]
+    found = (getattr(event, each.name) for each in protocol.beside(protocol.by_name[event.NAME]))
+    beside = [each.encode().hex() if isinstance(each, str) else int(each) for each in found]
     return ":".join(["message", event.NAME, str(address), *map(str, beside), event.to_bytes().hex() or "-"])
 
 

@@ -235,6 +235,11 @@ class _Source:
             for name, message in held.items():
                 self._add(f"                case {name}_ID:")
                 for value in self.protocol.beside(message):
+                    if isinstance(value.type, Blob):
+                        place = f"frame.parts.{naming.member(value.name)}, {value.type.length.maximum}u"
+                        self._add(f"                    put_digits({place});")
+                        self._add("                    putchar(':');")
+                        continue
                     assert isinstance(value.type, Scalar)
                     form, cast = (
                         ("%lld", "long long") if value.type.signed else ("%llu", "unsigned long long")

@@ -36,7 +36,10 @@ def random_present(values: Iterable[Value], rng: random.Random) -> dict[str, Raw
 
 def random_beside(protocol: Protocol, message: Message, rng: random.Random) -> dict[str, Raw]:
     """Legal raw values of the frame of a message."""
-    found: dict[str, Raw] = {value.name: _random(value, rng) for value in protocol.beside(message)}
+    drawn = {value.name: _random(value, rng) for value in protocol.beside(message)}
+    found: dict[str, Raw] = {
+        name: int.from_bytes(raw, "big") if isinstance(raw, bytes) else raw for name, raw in drawn.items()
+    }
     numbers = {name: raw for name, raw in found.items() if isinstance(raw, int)}
     for part in protocol.frame.conditional if isinstance(protocol.frame, DelimitedFrame) else ():
         if part.role != "length" and not all(test.holds(numbers[test.value]) for test in part.when):

@@ -7,8 +7,8 @@ from typing import assert_never
 
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import halves, is_wide, literal, scalar_type, storage, unsigned, unsigned_type
-from qlinkgen.model.types import Scalar
-from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
+from qlinkgen.model.types import Characters, Scalar
+from qlinkgen.plan.expr import Clear, Condition, Legible, OneOf, Within
 from qlinkgen.plan.payload import conditions, limits
 
 
@@ -42,6 +42,11 @@ def broken(
                 terms += [f"{value} > {literal(rule.high, bits, signed=signed)}"] * (rule.high < held.high)
             case OneOf():
                 terms.append(_outside(rule, value, held, bits, signed=signed))
+            case Legible(Characters(number, excluded)):
+                letters = [f"{value}[{at}]" for at in range(number)]
+                terms += [f"{each} > 0x7FU" for each in letters]
+                barred = [unsigned(each, 8, hexadecimal=True) for each in excluded]
+                terms += [f"{each} == {octet}" for each in letters for octet in barred]
             case Clear():
                 terms.append(f"({value} & {unsigned(rule.mask, bits, hexadecimal=True)}) != 0U")
             case _:
@@ -78,7 +83,7 @@ def refusal(terms: list[str], error: str) -> list[str]:
 
 
 def as_unsigned(number: Scalar, value: str) -> str:
-    """The expression that converts a struct member to an unsigned integer of its bits."""
+    """The expression that converts a struct member other than a text to an unsigned integer of its bits."""
     if number.meaning == "bool":
         return f"({unsigned_type(number.bits)})({value} ? 1U : 0U)"
     return f"({unsigned_type(number.bits)}){value}" if number.signed and not is_wide(number) else value

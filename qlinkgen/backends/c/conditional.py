@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from qlinkgen.backends.c.conditions import condition
+from qlinkgen.backends.c.names import unsigned
 from qlinkgen.backends.c.places import Places
 from qlinkgen.model.condition import Test
 from qlinkgen.model.naming import member
-from qlinkgen.model.types import Scalar
+from qlinkgen.model.types import Characters, Scalar
 from qlinkgen.plan.conditional import Conditional, Selector
+from qlinkgen.plan.payload import Member
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +52,14 @@ def _bits(places: Places, selector: Selector, place: str) -> str:
 
 def refused(conditional: Conditional) -> list[str]:
     """Conditions that hold if a value is not its default."""
-    numbers = {each.name: each.number for each in conditional.values}
-    defaults = {name: number.default for name, number in numbers.items()}
-    tests = [Test(name, ((default, default),), negated=True) for name, default in defaults.items()]
-    return [condition((test,), numbers, lambda name: f"parts->{member(name)}") for test in tests]
+    return [test for each in conditional.values for test in _changed(each, f"parts->{member(each.name)}")]
+
+
+def _changed(each: Member, value: str) -> list[str]:
+    """Conditions that hold if a value is not its default."""
+    default = each.number.default
+    if isinstance(text := each.number.meaning, Characters):
+        octets = (unsigned(byte, 8, hexadecimal=True) for byte in default.to_bytes(text.number, "big"))
+        return [f"{value}[{at}] != {octet}" for at, octet in enumerate(octets)]
+    test = Test(each.name, ((default, default),), negated=True)
+    return [condition((test,), {each.name: each.number}, lambda _: value)]

@@ -10,7 +10,7 @@ from qlinkgen.model.fields import Layout, Value
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Command
-from qlinkgen.model.types import Enum, Flags, Float, Length, Scalar
+from qlinkgen.model.types import Characters, Enum, Flags, Float, Length, Scalar
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -145,6 +145,8 @@ def _facts(scalar: Scalar) -> list[str]:
         case Float():
             facts.append(f"bits of an {scalar.meaning.name}")
             facts += ["{}..{}".format(*scalar.meaning.bounds)] if scalar.meaning.bounds else []
+        case Characters():
+            facts.append("7-bit characters")
         case "bool" | None:
             pass
         case _:

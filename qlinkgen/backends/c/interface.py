@@ -14,7 +14,7 @@ from qlinkgen.backends.c.types import Types
 from qlinkgen.model import naming
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Scalar
+from qlinkgen.model.types import Characters, Scalar
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.payload import Holder, PayloadPlan, Presence, RunStep
 
@@ -101,6 +101,8 @@ class Interface:
 
     def width(self, scalar: Scalar) -> int:
         """Size of the struct member of an integer."""
+        if isinstance(scalar.meaning, Characters):
+            return scalar.meaning.number
         return 1 if scalar_type(scalar) == "bool" else storage(scalar.bits) // 8
 
     @staticmethod

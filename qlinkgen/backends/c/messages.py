@@ -19,6 +19,7 @@ from qlinkgen.backends.c.types import Kind, Types
 from qlinkgen.backends.c.walked import WalkedDecoder, WalkedEncoder, size_lines
 from qlinkgen.model import naming
 from qlinkgen.model.fields import Layout, Value
+from qlinkgen.model.types import Characters
 from qlinkgen.plan.payload import (
     BytesStep,
     Holder,
@@ -357,6 +358,8 @@ class MessageWriter:
         """The declaration of a value."""
         many = f"[{each.length.maximum}]" if isinstance(each, RunStep) else ""
         match each:
+            case Member() if isinstance(text := each.number.meaning, Characters):
+                kind, many = "uint8_t", f"[{text.number}]"
             case ValueStep() | Member() | ItemsStep():
                 kind = self._types.of(each.number)
             case BytesStep():

@@ -6,7 +6,7 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.naming import address_member, snake, stem
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
-from qlinkgen.model.types import Enum, Flags, Scalar
+from qlinkgen.model.types import Characters, Enum, Flags, Scalar
 
 _WIDTHS = (8, 16, 32, 64, 128)
 
@@ -67,6 +67,9 @@ def literal(value: int, bits: int, *, signed: bool) -> str:
 
 def scalar_literal(scalar: Scalar, value: int) -> str:
     """A constant of a scalar's type."""
+    if isinstance(text := scalar.meaning, Characters):
+        letters = value.to_bytes(text.number, "big")
+        return f"{{{', '.join(unsigned(each, 8, hexadecimal=True) for each in letters)}}}"
     if scalar.meaning == "bool":
         return "true" if value else "false"
     if is_wide(scalar):

@@ -13,6 +13,7 @@ from qlinkgen.backends.c.conditional import ConditionalView, holds, refused
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.backends.c.places import any_of, in_hex, refusal, shifted
 from qlinkgen.model.naming import member
+from qlinkgen.model.types import Characters
 from qlinkgen.plan.conditional import Conditional
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import (
@@ -117,6 +118,8 @@ class PartWriter(CheckWriter):
                 shifted = self.sender.address
             case ConstantSlot():
                 return f"({kind}){unsigned(slot.values[0], slot.bits, hexadecimal=True)}"
+            case Member() if isinstance(slot.number.meaning, Characters):
+                return self.layouts.get(slot.number.integer, f"parts->{member(slot.name)}", "0")
             case Member():
                 shifted = as_unsigned(slot.number, f"parts->{member(slot.name)}")
             case _:
@@ -145,6 +148,8 @@ class PartWriter(CheckWriter):
             raw = found if each.number.meaning == "bool" else f"({kind}){found}"
             value = from_unsigned(each.number, raw, self.layouts)
             line = f"frame->parts.{member(each.name)} = {value};"
+            if isinstance(each.number.meaning, Characters):
+                line = self.layouts.put(part.integer, f"frame->parts.{member(each.name)}", "0", found)
             tests = [holds(self, one, "body") for one in self.envelope.conditional if part in one.parts]
             lines += [f"if ({tests[0]}) {{", f"    {line}", "}"] if tests else [line]
         return lines

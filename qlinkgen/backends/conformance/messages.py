@@ -13,6 +13,7 @@ from qlinkgen.backends.conformance.sources import Header
 from qlinkgen.backends.conformance.streams import INTACT, Stream
 from qlinkgen.backends.conformance.unsent import Unsent, unsent
 from qlinkgen.model import naming
+from qlinkgen.model.types import Characters
 from qlinkgen.plan import MessagePlan, Plan
 from qlinkgen.plan.payload import (
     BytesStep,
@@ -316,6 +317,8 @@ class MemberRows:
         match step:
             case ValueStep() | Member() if step.number.bits > 64:
                 return [f"NUMBER({struct}, {name}.high),", f"NUMBER({struct}, {name}.low),"]
+            case ValueStep() | Member() if isinstance(step.number.meaning, Characters):
+                return [f"ITEMS({struct}, {name}),"]
             case ValueStep() | Member():
                 return [f"NUMBER({struct}, {name}),"]
             case RecordStep():

@@ -158,7 +158,11 @@ def _beside(plan: Plan, message: Message, entry: JsonObject) -> dict[str, int]:
     for value in plan.protocol.beside(message):
         key = record_key(value.name)
         native = from_json(value, entry[key]) if key in entry else default_of(value)
-        found[value.name] = raw_number(value.name, plan.beside[value.name].number, native)
+        found[value.name] = (
+            int.from_bytes(native.encode("ascii"), "big")
+            if isinstance(native, str)
+            else raw_number(value.name, plan.beside[value.name].number, native)
+        )
     return found
 
 

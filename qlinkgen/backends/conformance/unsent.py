@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from qlinkgen.backends.conformance.rows import Right, held, number_bytes, value_sizes
 from qlinkgen.backends.conformance.sources import Header
 from qlinkgen.model.message import Message
-from qlinkgen.model.types import Float, Scalar
+from qlinkgen.model.types import Characters, Float, Scalar
 from qlinkgen.plan import MessagePlan
 from qlinkgen.plan.payload import Holder, Member, RecordStep, ValueStep
 
@@ -54,6 +54,9 @@ def _spoilt(header: Header, holders: Sequence[Holder], values: bytes) -> Iterato
 def _outside(scalar: Scalar, size: int) -> Iterator[int]:
     """The nearest numbers out of range that the struct can hold; none for a bool, NaN for a float."""
     if scalar.meaning == "bool":
+        return
+    if isinstance(scalar.meaning, Characters):
+        yield scalar.meaning.excluded[-1] if scalar.meaning.excluded else 0x80
         return
     if isinstance(scalar.meaning, Float):
         yield from [scalar.meaning.raw(math.nan)] if scalar.meaning.bounds else []

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any, BinaryIO
 
 from construct import (
+    Adapter,
     Bytes,
     Construct,
     Container,
@@ -29,6 +30,27 @@ from ._fields import Message, Row, TextField, Values, _innermost
 
 _DECIMAL = re.compile(rb"[+-]?([0-9]*)\.?([0-9]*)\Z")
 _HEXADECIMAL = re.compile(rb"[0-9A-Fa-f]+\Z")
+
+
+class Letters(Adapter):
+    """An integer of the characters of a text, the first of which is its most significant byte."""
+
+    def __init__(self, subcon: Construct, size: int, excluded: bytes = b"") -> None:
+        super().__init__(subcon)
+        self.size = size
+        self.excluded = excluded
+
+    def _checked(self, text: bytes, path: str) -> bytes:
+        if len(text) != self.size or not text.isascii() or {*text} & {*self.excluded}:
+            raise ValidationError(f"{text!r} is not {self.size} legal characters", path=path)
+        return text
+
+    def _decode(self, obj: int, context: Container, path: str) -> str:
+        return self._checked(obj.to_bytes(self.size, "big"), path).decode("ascii")
+
+    def _encode(self, obj: str, context: Container, path: str) -> int:
+        text = obj.encode("ascii", "replace") if obj.isascii() else b""
+        return int.from_bytes(self._checked(text, path), "big")
 
 
 class TextNumber(Construct):

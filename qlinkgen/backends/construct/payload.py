@@ -16,9 +16,9 @@ from qlinkgen.model.fields import Layout, greatest_size
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import record_key
-from qlinkgen.model.types import Enum, Flags, Float, Scalar, byte_chunks
+from qlinkgen.model.types import Characters, Enum, Flags, Float, Scalar, byte_chunks
 from qlinkgen.model.values import native_from_raw
-from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
+from qlinkgen.plan.expr import Clear, Condition, Legible, OneOf, Within
 from qlinkgen.plan.parts import CellPart
 from qlinkgen.plan.payload import (
     BitsStep,
@@ -183,6 +183,8 @@ class Types:
         node, meaning = _converted(number, raw), number.meaning
         same = self._usual.get(name := _name(number)) == node
         match meaning:
+            case Characters():
+                return node
             case Float() | "bool" | None:
                 return Ref(self._names[name]) if same else node
             case Enum():
@@ -374,6 +376,8 @@ def _row(step: ItemsStep) -> tuple[Node, ...]:
 
 def _shown(number: Scalar, raw: int) -> Node:
     """The native value of a raw number."""
+    if isinstance(text := number.meaning, Characters):
+        return text.text(raw)
     value = native_from_raw(number, raw)
     if isinstance(value, Decimal):
         return _decimal(value)
@@ -392,7 +396,7 @@ def _name(number: Scalar) -> str:
     match meaning:
         case Enum() | Flags():
             return meaning.name
-        case Float() | "bool" | None:
+        case Float() | Characters() | "bool" | None:
             return number.type_name
         case _:
             assert_never(meaning)
@@ -425,6 +429,9 @@ def _limited(node: Node, limit: Condition) -> Node:
             return Call("Ranged", (node, limit.low, limit.high))
         case Clear():
             return Call("Clear", (node, hexadecimal(limit.mask)))
+        case Legible():
+            text = limit.characters
+            return Call("Letters", (node, text.number, *((text.excluded,) if text.excluded else ())))
         case OneOf():
             raise AssertionError("only floating-point numbers have several ranges")
         case _:

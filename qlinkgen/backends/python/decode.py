@@ -12,7 +12,7 @@ from qlinkgen.backends.python.names import held
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
 from qlinkgen.model.integer import Integer, packed_size
-from qlinkgen.model.types import Enum, Flags, Float, Scalar
+from qlinkgen.model.types import Characters, Enum, Flags, Float, Scalar
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import Size, Within
 from qlinkgen.plan.parts import (
@@ -543,6 +543,13 @@ class Decoder:
     def get_member(self, member: Member, taken: str, offset: str, data: str = "") -> None:
         """Check and assign the value that some bits hold."""
         raw, target = f"{member.name}_raw", f"message.{held(member)}"
+        if isinstance(text := member.number.meaning, Characters):
+            whole = f"({taken})" if " " in taken else taken
+            self._values.append(f'{raw} = {whole}.to_bytes({text.number}, "big")')
+            wrong = [f"not {raw}.isascii()", *(f"{each} in {raw}" for each in text.excluded)]
+            self._refuse(" or ".join(wrong), member.name, raw, offset, data)
+            self._values.append(f'{target} = {raw}.decode("ascii")')
+            return
         if member.number.signed:
             taken = integers.sign_extended(f"({taken})", member.bits)
         if _is_plain(member.number) and not member.conditions:
@@ -724,6 +731,8 @@ def converted(number: Scalar, raw: str, scale: str, place: Place) -> str:
             return f"{place.classes[meaning.name]}.members.get({raw}, {raw})"
         case "bool":
             return f"{raw} == 1"
+        case Characters():
+            raise AssertionError("a text is not converted from a number")
         case Flags() | Float() | None:
             pass
         case _:
@@ -746,7 +755,7 @@ def _is_plain(number: Scalar) -> bool:
             return number.scaling is None
         case Float():
             return True
-        case Enum() | "bool":
+        case Enum() | Characters() | "bool":
             return False
         case _:
             assert_never(number.meaning)

@@ -18,7 +18,7 @@ from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
 from qlinkgen.backends.python.varied import ends, is_sized, octets_of
 from qlinkgen.model.integer import Integer, packed_size
-from qlinkgen.model.types import Float
+from qlinkgen.model.types import Characters, Float
 from qlinkgen.plan.expr import Condition, Within
 from qlinkgen.plan.parts import (
     AddressPart,
@@ -202,7 +202,8 @@ class Encoder:
         return (
             bool(integers.letter(part.integer, self.place.byteorder))
             and (value.shift, value.bits) == (0, part.integer.bits)
-            and not (value.number.signed or value.number.scaling or isinstance(value.number.meaning, Float))
+            and not (value.number.signed or value.number.scaling)
+            and not isinstance(value.number.meaning, Float | Characters)
             and all(each.of is not part for each in followers)
         )
 
@@ -341,6 +342,13 @@ class Encoder:
 
     def _indexed(self, each: ValueStep | Member) -> None:
         """Assign a value to a local as an int, and check its range."""
+        if isinstance(text := each.number.meaning, Characters):
+            octets = f"{each.name}_octets"
+            self._lines.append(f'{octets} = {source_of(each)}.encode("ascii")')
+            self._lines.append(f'{each.name}_raw = int.from_bytes({octets}, "big")')
+            self._terms.append(f"len({octets}) == {text.number}")
+            self._terms += [f"{barred} not in {octets}" for barred in text.excluded]
+            return
         self._lines.append(f"{each.name}_raw = {self.place.use('index')}({source_of(each)})")
         self._require(f"{each.name}_raw", *limits(each.number))
 

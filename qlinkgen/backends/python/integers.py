@@ -9,7 +9,7 @@ from typing import assert_never
 from qlinkgen.backends.python.layout import slice_of
 from qlinkgen.model.digits import Digits
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer
-from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
+from qlinkgen.plan.expr import Clear, Condition, Legible, OneOf, Size, Term, Within
 from qlinkgen.plan.payload import CountStep
 
 #: Format letters of struct for integers by size; lower case is signed.
@@ -197,6 +197,8 @@ def holds(condition: Condition, number: str) -> str:
         case OneOf():
             terms = [holds(each, number) for each in condition.ranges]
             return f"({' or '.join(terms)})" if len(terms) > 1 else terms[0]
+        case Legible():
+            raise AssertionError("the characters of a text are compared, not its number")
         case _:
             assert_never(condition)
 
@@ -212,6 +214,8 @@ def broken(condition: Condition, number: str) -> str:
             return broken(only, number)
         case Within() | OneOf():
             return f"not {holds(condition, number)}"
+        case Legible():
+            raise AssertionError("the characters of a text are compared, not its number")
         case _:
             assert_never(condition)
 

@@ -15,7 +15,7 @@ from qlinkgen.backends.python.varied import is_last
 from qlinkgen.model.condition import Test
 from qlinkgen.model.frame import PartBits
 from qlinkgen.model.message import Value
-from qlinkgen.model.types import Enum, Flags, Float, Scalar
+from qlinkgen.model.types import Characters, Enum, Flags, Float, Scalar
 from qlinkgen.model.values import Native, native_from_raw
 from qlinkgen.plan.payload import (
     BitsStep,
@@ -74,6 +74,8 @@ def _number_type(number: Scalar, place: Place) -> str:
             return f"{place.classes[enum.name]} | int"
         case "bool":
             return "bool"
+        case Characters():
+            return "str"
         case Flags() | Float() | None:
             return place.use("Decimal") if number.number == "decimal" else number.number
         case _:
@@ -149,6 +151,8 @@ def _number(number: Scalar, raw: int, place: Place) -> str:
             return f"{place.classes[enum.name]}.{member.upper()}" if member else str(raw)
         case Flags():
             return f"0x{raw:X}" if raw else "0"
+        case Characters() as text:
+            return python_text.literal(text.text(raw))
         case Float() | "bool" | None:
             return _native(native_from_raw(number, raw))
         case _:
@@ -284,6 +288,8 @@ def _is_whole(number: Scalar) -> bool:
             return False
         case Flags() as flags:
             return not flags.reserved_zero
+        case Characters():
+            return False
         case Enum() | "bool" | None:
             return number.scaling is None
         case _:
@@ -303,6 +309,10 @@ def _number_rule(name: str, number: Scalar, place: Place, scales: Mapping[str, s
             return _rule(place, "MaskRule", name, f"0x{flags.mask:X}")
         case Float() as kind:
             return _rule(place, "FloatRule", name, kind.bits, *(kind.bounds or ()), unit=number.unit)
+        case Characters(size, b""):
+            return _rule(place, "TextRule", name, size, size)
+        case Characters(size, excluded):
+            return _rule(place, "BetweenRule", name, size, size, literal(excluded))
         case Flags() | Enum() | "bool" | None:
             return _rule(place, "IntRule", name, number.minimum, number.maximum, unit=number.unit)
         case _:
@@ -375,6 +385,8 @@ def _number_facts(number: Scalar, place: Place) -> str:
             return ""
         case Float() as kind if kind.bounds is None:
             return f"{kind.name}{_of(number)}"
+        case Characters() as text:
+            return f"{text.number} characters"
         case Float() | None:
             pass
         case _:

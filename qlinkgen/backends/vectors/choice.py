@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import assert_never
 
 from qlinkgen.model.integer import Integer, unpack_chunks
-from qlinkgen.model.types import Float, Length, Scalar
+from qlinkgen.model.types import Characters, Float, Length, Scalar
 from qlinkgen.plan.content import Raw, Unsendable, broken, by_value, default_of, pack
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import Clear
@@ -145,6 +145,8 @@ class Rule:
 
     def _chosen(self, scalar: Scalar, bits: int) -> int:
         number = self._number(scalar, bits & scalar.integer.mask)
+        if isinstance(scalar.meaning, Characters):
+            return scalar.meaning.nearest(number)
         for each in conditions(scalar):
             number &= ~each.mask if isinstance(each, Clear) else -1
         return number

@@ -18,7 +18,7 @@ from qlinkgen.model.integer import Integer
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.content import Raw, pack, pack_items, places, unpack_items
-from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
+from qlinkgen.plan.expr import Clear, Condition, Legible, OneOf, Within
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
     AddressPart,
@@ -450,6 +450,8 @@ def _outside(rule: Condition | None, least: int, most: int) -> list[int]:
             near = [number for each in rule.ranges for number in (each.high + 1, each.low - 1)]
         case Clear():
             near = [rule.mask & -rule.mask]
+        case Legible():
+            near = [rule.characters.excluded[-1] if rule.characters.excluded else 0x80]
         case None:
             return []
         case _:

@@ -42,6 +42,8 @@ _SHAPES = (
     (r".*altitude|separation|depth|offset|scale", 1, 1),
     (r".dop|age|speed|.*course|knots|heading|variation|feet|metres|fathoms|angle", 1, 2),
 )
+#: What it takes for a talker; P begins a sentence of a manufacturer.
+_TALKER = re.compile(r"[A-OQ-Z][A-Z]")
 #: What it reads as numbers that it cannot have: times and dates, which may be any digits here.
 _CLOCKS = ("time", "date")
 
@@ -64,7 +66,7 @@ def _fields(message: str) -> tuple[Field, ...]:
 
 
 def build(record: Record) -> bytes | None:
-    if record["talker_1"] == ord("P"):
+    if not _TALKER.fullmatch(record["talker"]):
         return None
     kind, fields = _TYPES[record["message"]], record["fields"]
     stated = _fields(record["message"])
@@ -73,14 +75,13 @@ def build(record: Record) -> bytes | None:
     while optional and optional[-1] and not texts[-1]:
         texts.pop()
         optional.pop()
-    talker = chr(record["talker_1"]) + chr(record["talker_2"])
-    sentence = getattr(pynmea2, kind)(talker, kind, texts)
+    sentence = getattr(pynmea2, kind)(record["talker"], kind, texts)
     return str(sentence.render(newline=True)).encode()
 
 
 def read(wire: bytes, direction: Direction) -> Record | None:
     del direction
-    if wire[1:2] == b"P":  # it takes this for a sentence of a manufacturer
+    if not _TALKER.fullmatch(wire[1:3].decode()):
         return None
     parsed = pynmea2.parse(wire.decode(), check=True)
     message = next(name for name, each in _TYPES.items() if each == parsed.sentence_type)
@@ -95,5 +96,4 @@ def read(wire: bytes, direction: Direction) -> Record | None:
             fields[field.name] = _QUALITY[value] if value < len(_QUALITY) else value
         else:
             fields[field.name] = None if value in ("", None) else float(value)
-    letters = {"talker_1": ord(parsed.talker[0]), "talker_2": ord(parsed.talker[1])}
-    return {"message": message, **letters, "fields": fields}
+    return {"message": message, "talker": parsed.talker, "fields": fields}

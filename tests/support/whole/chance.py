@@ -144,6 +144,9 @@ def _number(kind: Number, rng: random.Random, mark: int) -> int:
     if kind.real:
         return _real(kind, rng)
     low, high = kind.low, kind.high
+    if kind.without is not None:
+        text = bytes(rng.choice((rng.randrange(0x80), mark & 0x7F, 0, 0x7F)) for _ in range(kind.bits // 8))
+        return int.from_bytes(bytes(0x41 if each in kind.without else each for each in text), "big")
     number = rng.choice(
         (low, high, rng.randint(low, high), rng.randint(low, high), min(high, max(low, mark)))
     )

@@ -122,7 +122,7 @@ def native(kind: Value, raw: Any) -> Any:
         return bytes(raw).decode("ascii") if kind.text else raw
     assert isinstance(raw, int)
     exact = kind.native(raw)
-    if isinstance(exact, float):
+    if isinstance(exact, float | str):
         return exact
     if kind.scale is None or not isinstance(exact, Fraction):
         return exact
@@ -151,6 +151,8 @@ def raw_of(kind: Value, found: Any) -> Raw:
 
 
 def _number_of(kind: Number, found: Any) -> int:
+    if kind.without is not None:
+        return int.from_bytes(found.encode("ascii"), "big")
     if kind.real:
         if not isinstance(found, float):
             raise TypeError(f"{found!r} is of a wrong type")
@@ -454,7 +456,8 @@ class CTarget(Target):
             return Heard(int(at), kind)
         name, address, *numbers, payload = rest
         message = self.reference.by_name[name]
-        beside = {each: int(word) for (each, _), word in zip(message.beside, numbers, strict=True)}
+        pairs = zip(message.beside, numbers, strict=True)
+        beside = {each: _raw(kind, iter((word,))) for (each, kind), word in pairs}
         try:
             values = str({**beside, **decode_payload(message, _bytes(payload))})
         except Wrong as wrong:
@@ -500,6 +503,8 @@ def _words(kind: Value, raw: Any) -> Iterator[str]:
             yield from _words(kind.record, record)
     elif isinstance(kind, Run) and kind.pad:
         yield raw.ljust(kind.most, kind.pad).hex()
+    elif isinstance(kind, Number) and kind.without is not None:
+        yield raw.to_bytes(kind.bits // 8, "big").hex()
     elif isinstance(raw, int):
         yield str(raw)
     else:
@@ -512,6 +517,8 @@ def _raw(kind: Value, words: Iterator[str]) -> Raw:
     if isinstance(kind, Records):
         return [_raw_record(kind.record, words) for _ in range(int(next(words)))]
     word = next(words)
+    if isinstance(kind, Number) and kind.without is not None:
+        return int(word, 16)
     if isinstance(kind, Number):
         raw = int(word, 0)
         return raw - (1 << 128) if kind.signed and word.startswith("0x") and raw >> 127 else raw

@@ -193,8 +193,13 @@ class Fields:
         )
         if isinstance(slot.kind, Packed):
             return slot, slot.kind.members
-        assert isinstance(slot.kind, Number)
-        return slot, ((name, 0, slot.kind),)
+        kind = slot.kind
+        if isinstance(kind, Run):  # the first character is the most significant byte
+            bits, default = 8 * kind.low, int.from_bytes(bytes(kind.default), "big")
+            pieces = byte_pieces(kind.low, "big")
+            kind = Number(bits, False, pieces, 0, (1 << bits) - 1, default, without=b"")
+        assert isinstance(kind, Number)
+        return replace(slot, kind=kind), ((name, 0, kind),)
 
     def _resolved(self, spec: Any) -> Doc:
         """A field merged with its named types."""

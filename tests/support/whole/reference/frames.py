@@ -167,6 +167,19 @@ def _among(part: Part, names: Collection[str]) -> Part:
     return replace(part, spec=spec)
 
 
+def _ended(part: Part, end: bytes, coded: Collection[str]) -> Part:
+    """A part whose texts do not have the bytes that end a frame, unless a coding hides them."""
+    if part.name in coded:
+        return part
+    return replace(
+        part,
+        values=tuple(
+            (name, at, kind if kind.without is None else replace(kind, without=end))
+            for name, at, kind in part.values
+        ),
+    )
+
+
 def _bits_of_values(part: Part, given: Mapping[str, Raw]) -> int:
     raw = 0
     for name, shift, kind in part.values:
@@ -231,6 +244,9 @@ class Frame:
         self.silent = bool(frame.get("silent"))
         self.codings = codings(frame.get("coding"))
         self._over = _coded_names(frame.get("coding"), self.parts, silent=self.silent)
+        if self.terminator:
+            hidden = self._over if self.codings else []
+            self.parts = [_ended(part, self.terminator.constant, hidden) for part in self.parts]
         #: Names of parts that are decoded as they are read.
         self.coded_names = [] if self.terminator or self.silent else self._over
         #: Maximum payload size on the wire, including inserted bytes if the length counts them.

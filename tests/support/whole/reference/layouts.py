@@ -37,6 +37,8 @@ class Number:
     #: The integer is the bits of a floating-point number, perhaps with bounds.
     real: bool = False
     bounds: tuple[float, float] | None = None
+    #: It is a text of a header, without these characters.
+    without: bytes | None = None
 
     def number(self, raw: int) -> float:
         """The floating-point number of bits."""
@@ -52,8 +54,10 @@ class Number:
         """A received integer without what a NaN does not preserve."""
         return self.pattern(math.nan) if self.real and math.isnan(self.number(raw)) else raw
 
-    def native(self, raw: int) -> Fraction | int | bool | float:
-        """The value in the unit, exactly."""
+    def native(self, raw: int) -> Fraction | int | bool | float | str:
+        """The value in the unit, exactly; that of a text."""
+        if self.without is not None:
+            return raw.to_bytes(self.bits // 8, "big").decode("ascii")
         if self.truth:
             return bool(raw)
         if self.real:

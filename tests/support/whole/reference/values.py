@@ -55,6 +55,9 @@ def check(number: Number, raw: int) -> None:
     """Check the range of a number. Raises Wrong."""
     if number.bounds and not number.bounds[0] <= number.number(raw) <= number.bounds[1]:
         raise Wrong("range", str(raw))
+    data = raw.to_bytes(number.bits // 8, "big") if number.without is not None else b""
+    if not data.isascii() or any(each in (number.without or b"") for each in data):
+        raise Wrong("range", str(raw))
     if not number.low <= raw <= number.high or raw & number.forbidden:
         raise Wrong("range", str(raw))
 
