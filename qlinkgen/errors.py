@@ -3,6 +3,7 @@
 * `QlinkgenError`: base class
     * `SchemaError`: a schema is wrong; holds every fault found, with its location
     * `GenerationError`: a valid schema cannot be generated for the requested target
+    * `UnsuitableSchema`: a schema lacks what the hand-written behaviour of its protocol needs
     * `CodecError`: a value or a frame violates the schema (also a `ValueError`)
         * `EncodeError`: a value cannot be sent
         * `DecodeError`: received bytes are not a valid message
@@ -54,6 +55,7 @@ __all__ = [
     "PortMissing",
     "QlinkgenError",
     "SchemaError",
+    "UnsuitableSchema",
 ]
 
 
@@ -110,6 +112,10 @@ class SchemaError(QlinkgenError):
 
 class GenerationError(QlinkgenError):
     """A valid schema cannot be generated for the requested target."""
+
+
+class UnsuitableSchema(QlinkgenError):
+    """A schema lacks what the hand-written behaviour of its protocol needs."""
 
 
 class CodecError(QlinkgenError, ValueError):

@@ -19,7 +19,7 @@ from qlinkgen.link.procedure import Procedure
 from qlinkgen.link.transaction import Question
 from qlinkgen.protocols.qlink import loading, motion, pacing
 from qlinkgen.protocols.qlink.arguments import positive, whole
-from qlinkgen.protocols.qlink.facts import BROADCAST
+from qlinkgen.protocols.qlink.facts import BROADCAST, SYNCS
 from qlinkgen.protocols.qlink.hexfile import read_hex
 from qlinkgen.protocols.qlink.matching import ACCEPTS
 from qlinkgen.transport.conversation import timing_of
@@ -62,8 +62,8 @@ class BusState:
 
     def next_sync(self, counter: int | None) -> int:
         """Return the number of the sync to send."""
-        number = self.syncs.counter if counter is None else whole("counter", counter, 0, 255)
-        self.syncs.counter = (number + 1) & 0xFF
+        number = self.syncs.counter if counter is None else whole("counter", counter, 0, SYNCS.most)
+        self.syncs.counter = SYNCS.after(number)
         return number
 
     def check(self, request: Question) -> None:

@@ -11,11 +11,10 @@ Bit 0 is number 1. Assumptions where the document is silent:
 from __future__ import annotations
 
 from qlinkgen.protocols.qlink.arguments import whole
+from qlinkgen.protocols.qlink.facts import LINES
 
-#: Inputs of a node, and outputs; section 7.16 has three bytes of each.
-LINES = 24
-ALL = (1 << LINES) - 1
-_BYTES = LINES // 8
+#: Bytes of the inputs, and of the outputs.
+_BYTES = (LINES.bit_length() + 7) // 8
 
 
 class IoImage:
@@ -41,13 +40,13 @@ class IoImage:
         Raises:
             ValueError: `value` is out of range.
         """
-        self._inputs = whole("inputs", value, 0, ALL)
+        self._inputs = whole("inputs", value, 0, LINES)
 
     def set_inputs(self, value: int, now: float, t1: float, t2: float) -> None:
         """Set the levels of the inputs.
 
         Args:
-            value: bit 0 is input 1, 0..0xFFFFFF.
+            value: bit 0 is input 1.
             now: when, in seconds.
             t1: seconds until output 1 goes high after input 1 went high.
             t2: seconds until output 1 goes low after input 1 went low.
@@ -55,7 +54,7 @@ class IoImage:
         Raises:
             ValueError: `value` is out of range.
         """
-        level = whole("inputs", value, 0, ALL) & 1
+        level = whole("inputs", value, 0, LINES) & 1
         self.advance(now)
         if level != self._inputs & 1:
             self._change = (now + (t1 if level else t2), level)
@@ -68,9 +67,9 @@ class IoImage:
             self.outputs = self.outputs & ~1 | self._change[1]
             self._change = None
 
-    def write(self, value: int, mask: int = ALL) -> None:
+    def write(self, value: int, mask: int = LINES) -> None:
         """Set the outputs under the mask; the others keep their levels."""
-        self.outputs = (self.outputs & ~mask | value & mask) & ALL
+        self.outputs = (self.outputs & ~mask | value & mask) & LINES
 
     def clear(self) -> None:
         """Clear the outputs, and cancel a pending change of output 1."""

@@ -12,7 +12,7 @@ from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError, LoadError
 from qlinkgen.link.procedure import Ask, Pause, Procedure, Tell
 from qlinkgen.link.transaction import Reply
-from qlinkgen.protocols.qlink.facts import PIECE
+from qlinkgen.protocols.qlink.facts import PIECE, PIECES
 
 #: Seconds between two rounds of attempts at one piece.
 RETRY_PAUSE = 0.05
@@ -69,7 +69,7 @@ def load(node: int, text: bytes, *, piece: int = PIECE, patience: float = 5.0) -
     starts = range(0, total, piece)
     for number, start in enumerate(starts):
         request = qlink.NodeProgramLoadRequest(
-            node=node, counter=number & 0xFF, program_data=text[start : start + piece]
+            node=node, counter=number % (PIECES.most + 1), program_data=text[start : start + piece]
         )
         reply = yield from _insist(request, start, total, patience)
         repeats += reply.attempts - 1

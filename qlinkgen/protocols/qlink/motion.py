@@ -20,7 +20,7 @@ from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError
 from qlinkgen.link.procedure import FAILURES, Ask, Pause, Procedure, Tell
 from qlinkgen.link.transaction import Reply
-from qlinkgen.protocols.qlink.facts import WORDS
+from qlinkgen.protocols.qlink.facts import MOTIONS, WORDS
 
 
 @dataclass(slots=True)
@@ -28,7 +28,7 @@ class MotionState:
     """A master's state of the motions of one node.
 
     Attributes:
-        counter: number of the next motion, 0..255.
+        counter: number of the next motion.
         known: the node cannot take that number for a repeat.
         pending: an unanswered motion.
         streaming: a stream uses the node exclusively.
@@ -53,7 +53,7 @@ class MotionState:
     def settled(self, request: qlink.MotionRequest) -> None:
         """Record that the node has taken the motion."""
         self.pending = None
-        self.counter = (request.counter + 1) & 0xFF
+        self.counter = MOTIONS.after(request.counter)
         self.known = True
 
     def failed(self, error: Exception, *, fresh: bool) -> None:
@@ -73,7 +73,7 @@ class MotionState:
     def drop(self) -> None:
         """Drop the pending motion and its number, so that a late answer to it is not accepted."""
         if self.pending is not None:
-            self.counter = (self.pending.counter + 1) & 0xFF
+            self.counter = MOTIONS.after(self.pending.counter)
             self.pending = None
 
     def forget(self) -> None:
@@ -127,7 +127,7 @@ class MotionProgress:
     Attributes:
         node: the node.
         queued: number of acknowledged words.
-        fifo_space: words that still fit, 0..255.
+        fifo_space: words that still fit.
         position: motor position, encoder counts.
         running: the motor runs.
         answer: the last response.

@@ -8,9 +8,9 @@ from math import isfinite
 from qlinkgen.codecs import qlink
 from qlinkgen.codecs.qlink import PositionType
 from qlinkgen.protocols.qlink.arguments import known, positive, whole
-from qlinkgen.protocols.qlink.facts import NODES
+from qlinkgen.protocols.qlink.facts import INFO, LINES, LONGEST_DELAY, NODES, POSITION_TYPES
 from qlinkgen.protocols.qlink.hex_image import HexImage
-from qlinkgen.protocols.qlink.io_image import ALL, IoImage
+from qlinkgen.protocols.qlink.io_image import IoImage
 from qlinkgen.protocols.qlink.motor import MotorRequests, echo
 from qlinkgen.protocols.qlink.path_fifo import PathFifo, signed_word
 from qlinkgen.protocols.qlink.program_store import ProgramStore
@@ -18,7 +18,6 @@ from qlinkgen.protocols.qlink.statistics import NodeStatistics, PathRecord
 
 #: Seconds by which a time may precede the last one: threads and drivers read the clock in any order.
 _DISORDER = 1.0
-_KNOWN_TYPES = (PositionType.JVL_MACTALK, PositionType.METRONIX)
 
 
 class NodeState:
@@ -89,12 +88,15 @@ class NodeState:
             ValueError: an argument is out of range, or a command is unknown.
         """
         self.number = whole("number", number, NODES[0], NODES[-1])
-        self.t1_delay = positive("t1_delay", t1_delay, "s", 25.5)
-        self.t2_delay = positive("t2_delay", t2_delay, "s", 25.5)
-        self.position_type = whole("position_type", position_type, 0, 255)
-        self.version = (whole("version[0]", version[0], 0, 255), whole("version[1]", version[1], 0, 255))
-        self.product_id = whole("product_id", product_id, 0, 0xFFFF)
-        self.serial_number = whole("serial_number", serial_number, 0, 0xFFFF_FFFF)
+        self.t1_delay = positive("t1_delay", t1_delay, "s", LONGEST_DELAY)
+        self.t2_delay = positive("t2_delay", t2_delay, "s", LONGEST_DELAY)
+        self.position_type = whole("position_type", position_type, 0, INFO["position_type"])
+        self.version = (
+            whole("version[0]", version[0], 0, INFO["version_major"]),
+            whole("version[1]", version[1], 0, INFO["version_minor"]),
+        )
+        self.product_id = whole("product_id", product_id, 0, INFO["product_id"])
+        self.serial_number = whole("serial_number", serial_number, 0, INFO["serial_number"])
         self.unsupported = known("unsupported", unsupported, qlink.COMMANDS)
         self.statistics = NodeStatistics()
         self.io = IoImage()
@@ -140,7 +142,7 @@ class NodeState:
 
     @outputs.setter
     def outputs(self, value: int) -> None:
-        self.io.write(whole("outputs", value, 0, ALL))
+        self.io.write(whole("outputs", value, 0, LINES))
 
     @property
     def position(self) -> int:
@@ -150,7 +152,7 @@ class NodeState:
     @property
     def position_valid(self) -> bool:
         """Whether the node knows the position: its position type is one that the document names."""
-        return self.position_type in _KNOWN_TYPES
+        return self.position_type in POSITION_TYPES
 
     @property
     def running(self) -> bool:

@@ -9,12 +9,12 @@ from qlinkgen.codecs import qlink
 from qlinkgen.errors import NoReply
 from qlinkgen.link.procedure import Ask, Pause, Procedure, Tell
 from qlinkgen.link.transaction import Reply
-from qlinkgen.protocols.qlink.facts import BROADCAST
+from qlinkgen.protocols.qlink.facts import BROADCAST, SYNCS
 
 
 @dataclass(slots=True)
 class SyncState:
-    """The number of the next sync, 0..255."""
+    """The number of the next sync."""
 
     counter: int = 0
 
@@ -24,7 +24,7 @@ class SyncTick:
     """A sync was sent.
 
     Attributes:
-        counter: its number, 0..255.
+        counter: its number.
         at: time on the port's clock, in seconds.
         late: seconds after its due time.
     """
@@ -68,7 +68,7 @@ def sync(
         reply: Reply = yield Ask(qlink.NodeSyncRequest(node=BROADCAST, counter=state.counter))
         now = reply.at
         tick = SyncTick(state.counter, now, 0.0 if first is None else now - first - slot * interval)
-        state.counter = (state.counter + 1) & 0xFF
+        state.counter = SYNCS.after(state.counter)
         if first is None:
             first = now
         else:

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 
 from qlinkgen.protocols.qlink.arguments import positive, whole
+from qlinkgen.protocols.qlink.facts import MOST_SPACE
 
 #: Tolerance for the end of a word, relative to its duration, for times like 0.1 that are not exact in binary.
 _NEARLY = 1e-6
@@ -50,7 +51,7 @@ class PathFifo:
         """Make an empty FIFO.
 
         Args:
-            capacity: words that fit, 0..255 (the free ones are reported in a byte).
+            capacity: words that fit, at most the number that a motion's answer can report.
             rate: words per second that the motor consumes, 0 for one that never moves.
             displacement: returns the displacement of a word, in encoder counts.
             started: whether the motor consumes words from the beginning.
@@ -58,7 +59,7 @@ class PathFifo:
         Raises:
             ValueError: capacity or rate is out of range.
         """
-        self.capacity = whole("capacity", capacity, 0, 255)
+        self.capacity = whole("capacity", capacity, 0, MOST_SPACE)
         self.started = started
         self.position = 0
         self.queued = self.drained = self.dropped = 0

@@ -15,6 +15,7 @@ Assumptions where the document is silent:
 
 from __future__ import annotations
 
+from qlinkgen.protocols.qlink.facts import PIECES
 from qlinkgen.protocols.qlink.hex_image import BrokenRecord, HexImage, HexReader
 from qlinkgen.protocols.qlink.statistics import NodeStatistics
 
@@ -50,7 +51,7 @@ class ProgramStore:
         if counter == self._last:
             self._statistics.repeated_pieces += 1
             return True
-        following = 0 if self._last is None else (self._last + 1) % 256
+        following = 0 if self._last is None else PIECES.after(self._last)
         if counter != following or not self._read(data):
             return self._refuse()
         self._store(counter, data)

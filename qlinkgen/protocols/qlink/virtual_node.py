@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from qlinkgen.codecs import qlink
 from qlinkgen.codecs.qlink_bus import SlaveHandlers
+from qlinkgen.protocols.qlink.facts import MOTION_INPUTS, MOTION_OUTPUTS, MOTIONS, SYNCS
 from qlinkgen.protocols.qlink.node_state import NodeState
 from qlinkgen.protocols.qlink.path_fifo import wrapped
 
@@ -95,7 +96,7 @@ class VirtualNode(NodeState, SlaveHandlers):
         if self._sync_counter == request.counter:
             counts.repeated_syncs += 1
         elif self._sync_counter is not None:
-            counts.missed_syncs += (request.counter - self._sync_counter - 1) % 256
+            counts.missed_syncs += SYNCS.between(self._sync_counter, request.counter)
         self._sync_counter = request.counter
 
     def node_program_load(
@@ -142,7 +143,7 @@ class VirtualNode(NodeState, SlaveHandlers):
         return qlink.MotionResponse(
             node=self.number,
             counter=request.counter,
-            inputs=self.io.inputs & 0xFF,
+            inputs=self.io.inputs & MOTION_INPUTS,
             position=self._told_position(),
             motor_status=self._motor_status(),
             fifo_space=self.path.space,
@@ -218,10 +219,10 @@ class VirtualNode(NodeState, SlaveHandlers):
         if not self.path.push(request.segments, now):
             counts.overruns += 1
             return False
-        if self._motion_counter is not None and request.counter != (self._motion_counter + 1) % 256:
+        if self._motion_counter is not None and request.counter != MOTIONS.after(self._motion_counter):
             counts.jumps += 1
         self._motion_counter = request.counter
-        self.io.write(request.outputs, 0xFF)
+        self.io.write(request.outputs, MOTION_OUTPUTS)
         counts.motions += 1
         counts.words += len(request.segments)
         if self.record is not None:
