@@ -11,8 +11,9 @@ from qlinkgen.backends import c, construct, python
 from qlinkgen.backends.base import Options
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import plan_of
-from qlinkgen.plan.codec import BadFrame, Codec
+from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.content import Unsendable
+from qlinkgen.plan.reading import BadFrame
 from qlinkgen.schema.loader import loads
 
 SCHEMA = """\
@@ -32,7 +33,8 @@ defaults: {{repeat: safe}}
 commands: {{}}
 messages: {{depth: {{id: DPT, fields: {{depth: {{type: u8, as: "decimal[3]"}}}}}}}}
 """
-ENDED, COUNTED = 'end: {role: terminator, text: "*"}', "end: {type: u8, algorithm: sum8, over: [talker, data]}"
+ENDED = 'end: {role: terminator, text: "*"}'
+COUNTED = "end: {type: u8, algorithm: sum8, over: [talker, data]}"
 
 
 def made(end: str) -> Protocol:
