@@ -116,7 +116,7 @@ class Field:
     #: The value of which it is a case, and the name of the case; "" for other fields.
     slot: str = ""
     case: str = ""
-    #: A count tells the bytes of that value.
+    #: A count tells the bytes of that value, or of its records of variable size.
     counted: bool = False
 
     @property
@@ -127,9 +127,20 @@ class Field:
             return False
         if isinstance(kind, Record):
             return kind.layout.open
+        if isinstance(kind, Records) and kind.layout.open:
+            return True
         if not isinstance(kind, Blob | Array | Records) or kind.length.fixed or kind.length.counted_by:
             return False
         return not isinstance(kind, Records) or not kind.last
+
+    @property
+    def final(self) -> bool:
+        """Whether nothing may follow it: a record in it takes all bytes that are left."""
+        kind = self.type
+        if isinstance(kind, Records):
+            numbered = kind.last or kind.length.fixed or kind.length.counted_by
+            return self.open and bool(numbered)
+        return self.open and isinstance(kind, Record)
 
     @property
     def conditional(self) -> bool:

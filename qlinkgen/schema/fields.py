@@ -121,7 +121,7 @@ class FieldBuilder:
                             "bad-count", place, what, hint, needs=(place[:-1], (*path, count.run))
                         )
                     counters.setdefault(count.run, field.name)
-        fields = [replace(each, counted=bool(each.slot) and each.slot in counters) for each in fields]
+        fields = [replace(each, counted=_is_sized(each, fields, counters)) for each in fields]
         return [_with_counter(field, counters.get(field.slot or field.name)) for field in fields]
 
     def _whole(self, fields: Sequence[Field], name: str, path: Path) -> Sequence[Field]:
@@ -205,14 +205,14 @@ class FieldBuilder:
             self._report.taint((*path, name))
         for field in open_fields:
             later = fields[fields.index(field) + 1 :]
-            single = isinstance(field.type, Record)
-            varied = (each for each in later if each.terminated or each.walked or single)
+            final = field.final
+            varied = (each for each in later if each.terminated or each.walked or final)
             ended = (each for each in varied if not exclusive(each.when, field.when))
             if other := next(ended, None):
                 what = f"{field.name} takes the rest of the payload, before {other.name}, whose size varies"
-                what = f"{field.name} takes the rest of the payload, before {other.name}" if single else what
+                what = f"{field.name} takes the rest of the payload, before {other.name}" if final else what
                 both = ((*path, field.name), (*path, other.name), *counts)
-                counted = "the field in it" if single else field.name
+                counted = "the field in it" if final else field.name
                 hint = f"move {other.name} before it, or give {counted} a count"
                 self._report.error("two-open-ends", (*path, other.name), what, hint, of_key=True, needs=both)
         if open_ends:
@@ -289,6 +289,15 @@ class FieldBuilder:
             self._report.error("payload-too-long", place, what, hint, of_key=True, needs=(path, ("frame",)))
             self._report.taint(place)
         return replace(field, type=replace(kind, length=replace(kind.length, maximum=max(1, most))))
+
+
+def _is_sized(field: Field, fields: Sequence[Field], counters: Collection[str]) -> bool:
+    """Whether a count tells the bytes of a choice, or of records of variable size."""
+    if field.slot:
+        return field.slot in counters
+    roles = [each.type.role for each in fields if isinstance(each.type, Scalar)]
+    counts = [role for role in roles if isinstance(role, Count) and role.run == field.name]
+    return field.walked and any(each.unit == "bytes" for each in counts)
 
 
 def _with_counter(field: Field, counter: str | None) -> Field:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 
 from qlinkgen.model.condition import Condition
-from qlinkgen.model.fields import Field, Layout, Record, Records
+from qlinkgen.model.fields import Field, Layout, Record, Records, applies
 from qlinkgen.model.types import Array, Length, Scalar
+from qlinkgen.model.values import Native, defaults_of
 from qlinkgen.schema.compounds import build_length
 from qlinkgen.schema.conditions import EndBuilder
 from qlinkgen.schema.file_base import Fact, Lifetime
@@ -70,15 +71,12 @@ class RecordBuilder:
             return None
         if text.count is None:
             return Record(layout)
-        if layout.open:
-            rest = next(each.slot or each.name for each in layout.fields if each.open)
-            what = f"{rest} takes the rest of the payload, so that a second {layout.name} has no bytes"
-            location.fault("bad-record", "type", what, f"put a count before {rest}, or use one {layout.name}")
         length = build_length(text, 8 * layout.least, payload_max, location)
         if length is None:
             self._report.taint(location.path)
             return None
         self._check_bound(text, layout, spec, location)
+        self._check_rest(layout, length, location)
         last = self._last(spec, layout, length, location) if spec.last else ()
         return Records(layout, length, required=length.minimum > 0 and not last, last=last)
 
@@ -86,6 +84,22 @@ class RecordBuilder:
         if not (text.count or "").strip() and (not layout.fixed or spec.last):
             what = f"the number of records {layout.name} has no bound, and their size varies"
             location.fault("bad-record", "type", what, f"write a bound, like {layout.name}[0..8]")
+
+    @staticmethod
+    def _check_rest(layout: Layout, length: Length, location: Location) -> None:
+        """Check that records take the rest of the payload on a condition, so that others come before it."""
+        if final := next((each for each in _open_fields(layout) if each.final), None):
+            name = final.slot or final.name
+            what = f"the last record of {name} tells whether {layout.name} takes the rest of the payload"
+            location.fault("bad-record", "type", what, f"put a count of bytes before {name}")
+        elif rest := _always_open(layout):
+            what = f"{rest} takes the rest of the payload, so that a second {layout.name} has no bytes"
+            hint = f"put a count before {rest}, give it an if, or use one {layout.name}"
+            location.fault("bad-record", "type", what, hint)
+        elif length.minimum > 1 and _is_open(layout, defaults_of(layout)):
+            what = f"a new {layout.name} takes the rest of the payload, so that a second one has no bytes"
+            hint = "give the tested field another default, or the array a minimum of 1"
+            location.fault("bad-record", "type", what, hint)
 
     def _last(self, spec: FieldSpec, layout: Layout, length: Length, location: Location) -> Condition:
         """The condition that the last record meets, and none before it."""
@@ -145,6 +159,34 @@ class RecordBuilder:
                 what = f"{field.name} would be a record inside of {_MAX_DEPTH} others"
                 hint = "use fields in place of one of the records"
                 self._report.error("extent-depth", place, what, hint, of_key=True)
+
+
+def _open_fields(layout: Layout) -> Iterator[Field]:
+    """The fields of a record, and of records in it, that take the rest of the payload."""
+    for each in layout.fields:
+        if each.open:
+            yield from _open_fields(each.type.layout) if isinstance(each.type, Record) else (each,)
+
+
+def _always_open(layout: Layout) -> str:
+    """The field that takes the rest of the payload in every record, "" if there is none."""
+    for each in layout.fields:
+        kind = each.type
+        if each.open and not each.when and (not isinstance(kind, Record) or _always_open(kind.layout)):
+            return each.slot or each.name
+    return ""
+
+
+def _is_open(layout: Layout, values: Mapping[str, Native]) -> bool:
+    """Whether a record with these values takes the rest of the payload."""
+    for each in layout.fields:
+        if each.open and applies(each.when, values.get):
+            inner = values.get(each.slot or each.name)
+            if not isinstance(each.type, Record) or not isinstance(inner, Mapping):
+                return True
+            if _is_open(each.type.layout, inner):
+                return True
+    return False
 
 
 def _depth(fields: tuple[Field, ...]) -> int:

@@ -199,8 +199,8 @@ _ALL = (
         "bad-record",
         "A record has a value, at least one byte, and an end that its own bytes tell.",
         "Records of variable size are read one after the other. A field that takes the rest of the payload "
-        "is only in a single record, after which nothing follows; in an array, give it a count. An array of "
-        "them has a bound, as structs of C have room for all of them. "
+        "is in a single record, after which nothing follows, or in the last one of an array; there it has an "
+        "if, or is a case of a choice. An array of them has a bound, as structs of C have room for all. "
         "Where last ends an array, a new record is a last one, and the bounds are [1..N].",
     ),
     Rule(

@@ -7,6 +7,7 @@ from qlinkgen.backends.c.conditions import condition, numbers_of
 from qlinkgen.backends.c.members import count_of, member_of
 from qlinkgen.backends.c.names import count_type
 from qlinkgen.model import naming
+from qlinkgen.plan.openings import Inner, openings
 from qlinkgen.plan.payload import CountStep, PayloadPlan, RecordsStep, RecordStep
 
 
@@ -48,6 +49,19 @@ def is_last(step: RecordsStep, value: str) -> str:
     """The condition that a record of a struct ends its array."""
     numbers = numbers_of(step.record.payload)
     return condition(step.last, numbers, lambda name: f"{value}.{naming.member(name)}")
+
+
+def opened(step: RecordsStep, value: str) -> str:
+    """The condition that a record of a struct takes all bytes that are left; "" if none does."""
+    found = [" && ".join(f"({_inner(each, step, value)})" for each in tests) for tests in openings(step)]
+    return " || ".join(f"({each})" for each in found) if len(found) > 1 else "".join(found)
+
+
+def _inner(inner: Inner, step: RecordsStep, value: str) -> str:
+    """The condition on a value of a record, or of one in it."""
+    record = inner.inside[-1].record if inner.inside else step.record
+    path = ".".join([value, *map(member_of, inner.inside)])
+    return condition([inner.test], numbers_of(record.payload), lambda name: f"{path}.{naming.member(name)}")
 
 
 class Reader:

@@ -16,6 +16,7 @@ from qlinkgen.backends.c.sizes import local, local_size, size_text, term_text
 from qlinkgen.model import naming
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.expr import Size, Within
+from qlinkgen.plan.openings import openings
 from qlinkgen.plan.payload import (
     CountStep,
     PayloadPlan,
@@ -188,6 +189,12 @@ class WalkedEncoder(Encoder):
             ends = f"({varied.is_last(step, value)})"
             differs = f"{ends} != ((index + 1U) == {local(step.name)})"
             refusal = checks.refusal([differs], f"{self.layouts.prefix.upper()}_ERROR_RANGE")
+            self.lines += self._loop(step, refusal)
+        if isinstance(step, RecordsStep) and openings(step):
+            test = varied.opened(step, f"message->{member_of(step)}[index]")
+            number = f"{step.length.maximum}U" if step.fixed else local(step.name)
+            early = f"((index + 1U) < {number}) && ({test})"
+            refusal = checks.refusal([early], f"{self.layouts.prefix.upper()}_ERROR_RANGE")
             self.lines += self._loop(step, refusal)
 
     def _if_sent(self, segment: Segment) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from io import BytesIO
+from itertools import pairwise
 from typing import Any, BinaryIO
 
 from construct import (
@@ -36,7 +37,8 @@ class SizeOf(Count):
 class Several(Construct):
     """From minimum to maximum records, each read from where the one before it ends.
 
-    With ``last``, the first record for which all tests hold is the last one.
+    With ``last``, the first record for which all tests hold is the last one. Some records take all bytes that
+    are left if ``resting``, which only the last one may.
     """
 
     def __init__(
@@ -45,12 +47,15 @@ class Several(Construct):
         minimum: int,
         maximum: int,
         last: Sequence[Test] = (),
+        *,
+        resting: bool = False,
     ) -> None:
         super().__init__()
         self.record = record
         self.minimum = minimum
         self.maximum = maximum
         self.last = last
+        self.resting = resting
         record.tested |= {name for name, _, _ in last}
 
     def checked(self, number: int, path: str) -> int:
@@ -71,10 +76,22 @@ class Several(Construct):
         if not isinstance(obj, Sequence):
             raise ValidationError(f"{obj!r} is not a list of records", path=path)
         self.checked(len(obj), path)
-        ends = [self.ends(self.record.written(each, stream, path)) for each in obj]
+        data, starts, ends = BytesIO(), list[int](), list[bool]()
+        for each in obj:
+            starts.append(data.tell())
+            ends.append(self.ends(self.record.written(each, data, path)))
         if self.last and ends != [*[False] * (len(ends) - 1), True]:
             raise ValidationError("only the last record must end the list", path=path)
+        stream.write(data.getvalue())
+        if self.resting:
+            self._check_rest(data.getvalue(), starts, path)
         return obj
+
+    def _check_rest(self, data: bytes, starts: Sequence[int], path: str) -> None:
+        """Check that each record ends where the next one begins."""
+        for at, after in pairwise(starts):
+            if self.record.read(data, at, len(data), path)[1] != after:
+                raise ValidationError("a record takes the bytes of others", path=path)
 
     def _sizeof(self, context: Container, path: str) -> int:
         return self.minimum * int(self.record.least)

@@ -19,6 +19,7 @@ from qlinkgen.model.naming import record_key
 from qlinkgen.model.types import Characters, Enum, Flags, Float, Scalar, byte_chunks
 from qlinkgen.model.values import native_from_raw
 from qlinkgen.plan.expr import Clear, Condition, Legible, OneOf, Within
+from qlinkgen.plan.openings import openings
 from qlinkgen.plan.parts import CellPart
 from qlinkgen.plan.payload import (
     BitsStep,
@@ -312,7 +313,8 @@ class _Field:
     def _several(self, step: RecordsStep) -> Named:
         last = tuple((each.value, each.ranges, each.negated) for each in step.last)
         given = (Ref(self._types.records[step.record.name]), step.length.minimum, step.length.maximum)
-        node = Call("Several", (*given, Sequence(last)) if last else given)
+        resting: tuple[tuple[str, Node], ...] = (("resting", True),) if openings(step) else ()
+        node = Call("Several", (*given, Sequence(last)) if last else given, resting)
         empty = Sequence((Call("Container"),) * step.length.minimum)
         return self._named(step, Call("Default", (node, empty)))
 

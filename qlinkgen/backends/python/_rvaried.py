@@ -6,7 +6,7 @@ Copied next to modules that use it, unchanged.
 from __future__ import annotations
 
 from ._records import BaseRecord, RecordsRule, moved
-from ._support import DecodeError, LayoutError, as_bytes, wrong_size
+from ._support import DecodeError, LayoutError, Rule, as_bytes, wrong_size
 
 TYPE_CHECKING = False  # as typing.TYPE_CHECKING; importing `typing` costs 5 ms
 if TYPE_CHECKING:
@@ -68,6 +68,26 @@ class EndedRule(RecordsRule):
         """Whether the records are legal, and only the last one ends the list."""
         ends = [self.is_last(each) for each in value]
         return super().allows(value) and ends.index(True) == len(ends) - 1
+
+
+class OpenRule(Rule):
+    """A list of records, of which only the last one may take all bytes that are left."""
+
+    __slots__ = ("is_open", "rule")
+
+    def __init__(self, rule: RecordsRule, is_open: Callable[[Value], bool]) -> None:
+        self.rule = rule
+        self.is_open = is_open
+        legal = f"{rule.legal}, of which only the last one takes the rest"
+        super().__init__(rule.name, legal)
+
+    def allows(self, value: Value) -> bool:
+        """Whether the records are legal, and only the last one takes the rest."""
+        return self.rule.allows(value) and not any(map(self.is_open, value[:-1]))
+
+    def complaint(self, value: object) -> str:
+        """The error text for a list, that of its first illegal record; "" if it is legal."""
+        return self.rule.complaint(value) or super().complaint(value)
 
 
 def read_one(

@@ -16,7 +16,7 @@ from qlinkgen.backends.python.layout import (
 from qlinkgen.backends.python.names import attribute, source_of
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
-from qlinkgen.backends.python.varied import ends, is_sized, octets_of
+from qlinkgen.backends.python.varied import closed, ends, is_sized, octets_of
 from qlinkgen.model.integer import Integer, packed_size
 from qlinkgen.model.types import Characters, Float
 from qlinkgen.plan.expr import Condition, Within
@@ -481,6 +481,8 @@ class Encoder:
         if step.last:
             flags = f"[{ends(step)} for each in {source}]"
             self._terms.append(f"{flags} == [False] * ({step.name}_count - 1) + [True]")
+        if test := closed(step):
+            self._terms.append(f"all({test} for each in {source}[:-1])")
         if step.fixed:
             self._terms.append(f"len({source}) == {step.length.maximum}")
         if is_sized(self.message.payload, step.name):

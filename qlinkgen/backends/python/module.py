@@ -58,7 +58,10 @@ _SHARED: Mapping[str, Sequence[str]] = {
     "_reach": ("EachOf",),
     "_records": (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records"),
     "_rules": ("FloatRule", "ListRule", "PaddedRule"),
-    "_rvaried": ("EndedRule", _VARIED_RECORD, "read_counted", "read_ended", "read_filled", "read_one"),
+    "_rvaried": (
+        *("EndedRule", "OpenRule", _VARIED_RECORD),
+        *("read_counted", "read_ended", "read_filled", "read_one"),
+    ),
     "_rwalks": ("MaybeRule", "Misplaced", "NEW", "misplaced"),
 }
 _ELSEWHERE = {"Decimal", "index", *_STRUCT, *(name for names in _SHARED.values() for name in names)}

@@ -11,12 +11,13 @@ from qlinkgen.backends import python_text
 from qlinkgen.backends.python.layout import Call, literal
 from qlinkgen.backends.python.names import attribute, held
 from qlinkgen.backends.python.place import Place
-from qlinkgen.backends.python.varied import is_last
+from qlinkgen.backends.python.varied import is_last, is_opened
 from qlinkgen.model.condition import Test
 from qlinkgen.model.frame import PartBits
 from qlinkgen.model.message import Value
 from qlinkgen.model.types import Characters, Enum, Flags, Float, Scalar
 from qlinkgen.model.values import Native, native_from_raw
+from qlinkgen.plan.openings import openings
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -277,8 +278,10 @@ def _record_rule(step: RecordStep | RecordsStep, place: Place) -> Call:
     if isinstance(step, RecordStep):
         return _rule(place, "RecordRule", name, kind)
     if step.last:
-        return _rule(place, "EndedRule", name, kind, step.length.maximum, is_last(step))
-    return _rule(place, "RecordsRule", name, kind, step.length.minimum, step.length.maximum)
+        rule = _rule(place, "EndedRule", name, kind, step.length.maximum, is_last(step))
+    else:
+        rule = _rule(place, "RecordsRule", name, kind, step.length.minimum, step.length.maximum)
+    return Call(place.use("OpenRule"), [rule.flat, is_opened(step)]) if openings(step) else rule
 
 
 def _is_whole(number: Scalar) -> bool:

@@ -10,6 +10,7 @@ from qlinkgen.backends.python.names import attribute, held, source_of
 from qlinkgen.backends.python.place import Place
 from qlinkgen.model.condition import Test
 from qlinkgen.plan.expr import OneOf, Within
+from qlinkgen.plan.openings import Inner, openings
 from qlinkgen.plan.payload import CountStep, PayloadPlan, RecordsStep, RecordStep, Segment
 
 #: Indent of the statements of a decoder.
@@ -36,6 +37,31 @@ def ends(step: RecordsStep) -> str:
     """Whether the record ``each`` is the last one."""
     tests = [Test(attribute(test.value), test.ranges, test.negated) for test in step.last]
     return condition(tests, "each.{}")
+
+
+def is_opened(step: RecordsStep) -> str:
+    """The function that tells whether a record takes all bytes that are left."""
+    return f"lambda each: {_opened(step)}"
+
+
+def closed(step: RecordsStep) -> str:
+    """Whether the record ``each`` leaves bytes for others; "" if all records do."""
+    found = openings(step)
+    if len(found) == 1 and len(found[0]) == 1:
+        test = _inside(found[0][0])
+        return condition([Test(test.value, test.ranges, not test.negated)], "each.{}")
+    return f"not ({_opened(step)})" if found else ""
+
+
+def _opened(step: RecordsStep) -> str:
+    found = [condition([_inside(each) for each in tests], "each.{}") for tests in openings(step)]
+    return " or ".join(f"({each})" if len(found) > 1 and " and " in each else each for each in found)
+
+
+def _inside(inner: Inner) -> Test:
+    """The test of an attribute of a record, or of one in it."""
+    path = [*map(held, inner.inside), attribute(inner.test.value)]
+    return Test(".".join(path), inner.test.ranges, inner.test.negated)
 
 
 def is_sized(payload: PayloadPlan, name: str) -> bool:

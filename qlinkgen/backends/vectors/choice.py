@@ -11,6 +11,7 @@ from qlinkgen.model.types import Characters, Float, Length, Scalar
 from qlinkgen.plan.content import Raw, Unsendable, broken, by_value, default_of, pack
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import Clear
+from qlinkgen.plan.openings import is_open
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -132,7 +133,7 @@ class Rule:
             case RecordsStep():
                 count = self._count(step.length)
                 records = [self.values(step.record.payload) for _ in range(count)]
-                return {step.name: _ended(step, records) if step.last else records}
+                return {step.name: _closed(step, _ended(step, records) if step.last else records)}
             case ConstantStep() | ReservedStep() | CountStep() | FilledStep():
                 return {}
             case _:
@@ -157,6 +158,14 @@ def _ended(step: RecordsStep, records: list[dict[str, Raw]]) -> list[dict[str, R
     usual = defaults(step.record.payload)
     others = [each for each in records[:-1] if not step.ends(each)]
     return [*others, records[-1] if step.ends(records[-1]) else usual]
+
+
+def _closed(step: RecordsStep, records: list[dict[str, Raw]]) -> list[dict[str, Raw]]:
+    """The records with defaults, or without those before the last one that take all bytes which are left."""
+    usual = defaults(step.record.payload)
+    replaced = [] if step.last or is_open(step, usual) else [usual]
+    others = [replaced if is_open(step, each) else [each] for each in records[:-1]]
+    return [each for several in others for each in several] + records[-1:]
 
 
 def _fitting_frame(plan: PayloadPlan, values: dict[str, Raw]) -> dict[str, Raw]:

@@ -21,7 +21,15 @@ from tests.support.whole.reference.layouts import (
     Value,
 )
 from tests.support.whole.reference.special import Packets
-from tests.support.whole.reference.values import Wrong, default_record, encode, holds, meets, met
+from tests.support.whole.reference.values import (
+    Wrong,
+    default_record,
+    encode,
+    holds,
+    meets,
+    met,
+    takes_rest,
+)
 
 
 def mark(reference: Reference) -> int:
@@ -114,7 +122,7 @@ def _value(kind: Value, rng: random.Random, mark: int) -> Raw:
     count = rng.choice((kind.low, kind.most, rng.randint(kind.low, kind.most), min(kind.most, kind.low + 2)))
     if isinstance(kind, Records):
         records = [_record(kind.record, rng, mark) for _ in range(count)]
-        return _ended(kind, records, rng, mark) if kind.last else records
+        return _ended(kind, records, rng, mark) if kind.last else _closed(kind, records, rng, mark)
     if kind.item:
         return [_number(kind.item, rng, mark) for _ in range(count)]
     limit = 0x7F if kind.text else 0xFF
@@ -136,8 +144,19 @@ def _ended(
     others: list[dict[str, Raw]] = []
     for record in records[:-1]:
         tries = (record, *(_record(kind.record, rng, mark) for _ in range(20)))
-        others += [each for each in tries if not meets(kind, each)][:1]
+        others += [each for each in tries if not meets(kind, each) and not takes_rest(kind, each)][:1]
     return [*others, records[-1] if meets(kind, records[-1]) else default_record(kind.record)]
+
+
+def _closed(
+    kind: Records, records: list[dict[str, Raw]], rng: random.Random, mark: int
+) -> list[dict[str, Raw]]:
+    """The records, of which only the last one takes all bytes that are left; a default record does not."""
+    others: list[dict[str, Raw]] = []
+    for record in records[:-1]:
+        tries = (record, *(_record(kind.record, rng, mark) for _ in range(20)), default_record(kind.record))
+        others += [each for each in tries if not takes_rest(kind, each)][:1]
+    return [*others, *records[-1:]]
 
 
 def _number(kind: Number, rng: random.Random, mark: int) -> int:

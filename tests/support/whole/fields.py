@@ -50,6 +50,8 @@ class Structure:
     last: Doc = field(default_factory=dict)
     #: Texts in it have terminators, which a frame without a length does not allow.
     ended: bool = False
+    #: Some of its values take all bytes that are left.
+    rests: bool = False
 
 
 @dataclass
@@ -154,8 +156,12 @@ class FieldMaker:
         for _ in range(rng.choice((0, 1, 2, 3) if last else (1, 2, 3))):
             more_size, inside = self._varied_part(made, taken, test)
             size, depth = size + more_size, max(depth, 1 + inside)
-        if rng.random() < 0.4:
-            listed, room = list(made.items()), Room(0, 24, open_end=False)
+        rests = rng.random() < 0.3
+        if rests and rng.random() < 0.6:
+            more_size, inside = self._rest_part(made, taken, test)
+            size, depth = size + more_size, max(depth, 1 + inside)
+        elif rng.random() < (1 if rests else 0.4):
+            listed, room = list(made.items()), Room(0, 24, open_end=rests)
             self._add_choice(listed, taken, room)
             made, size = dict(listed), size + 24 - room.left
             inside = max((self._depth(each) for spec in made.values() for each in _cases_of(spec)), default=0)
@@ -173,12 +179,27 @@ class FieldMaker:
             ended = "'terminator'" in repr(made) or any(
                 self.varied[name].ended for name in self.varied if f"'{name}" in repr(made)
             )
-            self.varied[self.words.name(self.taken)] = Structure({"fields": made}, size, depth, last, ended)
+            whole = {"fields": made}
+            self.varied[self.words.name(self.taken)] = Structure(whole, size, depth, last, ended, rests)
+
+    def _rest_part(self, made: Doc, taken: set[str], test: str) -> tuple[int, int]:
+        """What takes all bytes that are left in some records: its size, and the records inside each other."""
+        rng, name = self.rng, self.words.name(taken)
+        inner = [kind for kind, each in self.varied.items() if each.rests and each.depth == 1]
+        if inner and rng.random() < 0.5:
+            kind = rng.choice(inner)
+            made[name] = rng.choice((kind, {"type": kind, "if": test}))
+            return self.varied[kind].size, 1
+        most, kind = rng.choice((1, 4, 9)), "text" if self.shape.groups else rng.choice(("bytes", "u16"))
+        made[name] = {"type": f"{kind}[{rng.choice((0, 0, 1))}..{most}]", "if": test}
+        if rng.random() < 0.3:
+            made[self.words.name(taken)] = "u8"
+        return 2 * most + 1, 0
 
     def _varied_part(self, made: Doc, taken: set[str], test: str) -> tuple[int, int]:
         """A field of a record of variable size: its size, and the number of records inside each other."""
         rng, name, roll = self.rng, self.words.name(taken), self.rng.random()
-        inner = [name for name, each in self.varied.items() if each.depth == 1]
+        inner = [name for name, each in self.varied.items() if each.depth == 1 and not each.rests]
         if roll < 0.1 and self.shape.text and self.shape.has_length:
             most = rng.choice((1, 3, 6))
             made[name] = {"type": f"text[{rng.choice((0, most - 1))}..{most}]", "terminator": "00"}
@@ -228,7 +249,9 @@ class FieldMaker:
         if most < 1:
             return
         roll = rng.random()
-        if record.last and most > 1 and roll < 0.6:
+        if record.rests:  # what tells its own end comes last, see `_add_final`
+            roll = 0.4 if room.open_end and roll < 0.5 else 1
+        if record.last and most > 1 and roll < 0.6 and not record.rests:
             made.append((name, {"type": f"{kind}[1..{most}]", "last": record.last}))
         elif roll < 0.3:
             most = min(most, 2)
@@ -237,7 +260,12 @@ class FieldMaker:
             made.append((name, f"{kind}[{rng.choice((0, 0, 1))}..{most}]"))
             room.open_end = False
         else:
-            for unit in rng.choice((("items",), ("bytes",), ("bytes",), ("items", "bytes"))):
+            units = (
+                (("bytes",), ("items", "bytes"))
+                if record.rests
+                else (("items",), ("bytes",), ("bytes",), ("items", "bytes"))
+            )
+            for unit in rng.choice(units):
                 number = most * (record.size if unit == "bytes" else 1)
                 self._count(name, unit, number, made, len(made), taken=taken, room=room)
             made.append((name, {"type": f"{kind}[{rng.choice((0, 0, min(1, most - 1), most - 1))}..{most}]"}))
@@ -303,7 +331,35 @@ class FieldMaker:
         if self.shape.word <= 1 and not self.shape.groups and rng.random() < self.filled:
             left = room.left - room.least
             add_filled(rng, dated, lambda: self.words.name(taken), room=left, varied=self.varied)
+        if not fixed and self.shape.has_length and rng.random() < 2 * self.structured:
+            self._add_final(dated, taken, room)
         return dict(dated)
+
+    def _add_final(self, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
+        """Records at the end that tell their number, the last of which may take all bytes that are left."""
+        rng = self.rng
+        kinds = [
+            kind
+            for kind, each in self.varied.items()
+            if each.rests and each.size <= room.left - room.least - 4
+        ]
+        if not kinds or not room.open_end:
+            return
+        for _, each in made:
+            if isinstance(each, dict) and (
+                {"optional", "switch"} & each.keys() or ("packed" in each and ".." in each["type"])
+            ):
+                return
+            if self._is_open(each, made):
+                return
+        kind, name = rng.choice(kinds), self.words.name(taken)
+        record = self.varied[kind]
+        forms: list[Any] = [kind, f"{kind}[2]", f"{kind}[0..2]"]
+        forms += [{"type": f"{kind}[1..3]", "last": record.last}] * 2 if record.last else []
+        form = rng.choice(forms)
+        if str(form).endswith("2]") and ".." in form:
+            self._count(name, "items", 2, made, len(made), taken=taken, room=room)
+        made.append((name, form))
 
     def _add_choice(self, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
         """A value whose type an earlier field decides, at the end of the payload."""

@@ -212,7 +212,21 @@ def _encoded_records(kind: Records, records: Raw) -> bytes:
     ends = [meets(kind, each) for each in records]  # type: ignore[arg-type]
     if kind.last and ends != [*[False] * (len(ends) - 1), True]:
         raise Wrong("range", "the last record")
-    return b"".join(_fields(kind.record.slots, each) for each in records)  # type: ignore[arg-type]
+    whole = b"".join(_fields(kind.record.slots, each) for each in records)  # type: ignore[arg-type]
+    if any(takes_rest(kind, each) for each in records[:-1]):  # type: ignore[arg-type]
+        raise Wrong("range", "a record takes the rest")
+    return whole
+
+
+def takes_rest(kind: Records, values: Mapping[str, Raw]) -> bool:
+    """Whether a record is not read back alike where other bytes follow it."""
+    if kind.record.constant:
+        return False
+    try:
+        data = _fields(kind.record.slots, values)
+        return _Walk(kind.record.slots, data + data).run(0, 2 * len(data))[1] != len(data)
+    except Wrong:
+        return True
 
 
 def _told(slot: Slot, number: Number, counted: Kind, given: Raw) -> int:
