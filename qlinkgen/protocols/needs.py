@@ -24,6 +24,10 @@ class Cycle:
         """Return the number that follows another."""
         return (number + 1) % (self.most + 1)
 
+    def before(self, number: int) -> int:
+        """Return the number that precedes another."""
+        return (number - 1) % (self.most + 1)
+
     def between(self, earlier: int, later: int) -> int:
         """Return how many numbers come between two, 0 if the later one follows."""
         return (later - earlier - 1) % (self.most + 1)

@@ -19,7 +19,7 @@ from qlinkgen.protocols.qlink import survey
 from qlinkgen.protocols.qlink.bus_state import BusState, make_engine
 from qlinkgen.protocols.qlink.facts import BAUD, BROADCAST, NODES, PIECE
 from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport
-from qlinkgen.protocols.qlink.motion import MotionProgress, move
+from qlinkgen.protocols.qlink.motion import MotionProgress, Repeats, move
 from qlinkgen.protocols.qlink.pacing import SyncReport, SyncTick
 from qlinkgen.transport.aio import AsyncMaster
 from qlinkgen.transport.opening import open_port
@@ -47,12 +47,13 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         health: HealthPolicy | None = HealthPolicy(),  # noqa: B008  # immutable
         slack: float | None = None,
         crc: str | None = None,
+        repeats: Repeats = "answered",
         on_event: Callable[[Event], None] | None = None,
     ) -> None:
         """Take ownership of a port; arguments as for `Bus`."""
         engine = make_engine(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc)
         super().__init__(engine, port, on_event=on_event)
-        self.state = BusState()
+        self.state = BusState(repeats)
         self._moving: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
 
     @classmethod
@@ -66,11 +67,21 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         health: HealthPolicy | None = HealthPolicy(),  # noqa: B008  # immutable
         slack: float | None = None,
         crc: str | None = None,
+        repeats: Repeats = "answered",
         on_event: Callable[[Event], None] | None = None,
     ) -> AsyncBus:
         """Open a device name or a URL of pyserial, like `Bus.open`. Opening is fast, so it is synchronous."""
         port = open_port(name, baud=baud or BAUD)
-        return cls(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc, on_event=on_event)
+        return cls(
+            port,
+            attempts=attempts,
+            echo=echo,
+            health=health,
+            slack=slack,
+            crc=crc,
+            repeats=repeats,
+            on_event=on_event,
+        )
 
     async def transact(self, request: Question, *, attempts: int | None = None, trial: bool = False) -> Reply:
         """As `Bus.transact`."""

@@ -20,7 +20,7 @@ from qlinkgen.protocols.qlink import survey
 from qlinkgen.protocols.qlink.bus_state import BusState, make_engine
 from qlinkgen.protocols.qlink.facts import BAUD, BROADCAST, NODES, PIECE
 from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport
-from qlinkgen.protocols.qlink.motion import MotionProgress, MotionState, move
+from qlinkgen.protocols.qlink.motion import MotionProgress, MotionState, Repeats, move, unanswered
 from qlinkgen.protocols.qlink.pacing import SyncReport, SyncTick
 from qlinkgen.transport.blocking import BlockingMaster
 from qlinkgen.transport.opening import open_port
@@ -52,6 +52,7 @@ class Bus(BlockingMaster, MasterCalls):
         health: HealthPolicy | None = HealthPolicy(),  # noqa: B008  # immutable
         slack: float | None = None,
         crc: str | None = None,
+        repeats: Repeats = "answered",
         on_event: Callable[[Event], None] | None = None,
     ) -> None:
         """Take ownership of a port; closing the bus closes it.
@@ -65,11 +66,13 @@ class Bus(BlockingMaster, MasterCalls):
             slack: largest delay in seconds that driver, adapter and operating system add to a transaction; by
                 default derived from the port.
             crc: 16-bit CRC of the catalogue in place of the schema's.
+            repeats: whether nodes answer a motion that is sent again under its number (section 7.10 does not
+                say): `answered`, `silent`, or `auto` to find out with the first motion to each node.
             on_event: called with each event, in the calling thread.
         """
         engine = make_engine(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc)
         super().__init__(engine, port, on_event=on_event)
-        self.state = BusState()
+        self.state = BusState(repeats)
         self._moving: defaultdict[int, threading.Lock] = defaultdict(threading.Lock)
 
     def after_fork(self) -> None:
@@ -88,6 +91,7 @@ class Bus(BlockingMaster, MasterCalls):
         health: HealthPolicy | None = HealthPolicy(),  # noqa: B008  # immutable
         slack: float | None = None,
         crc: str | None = None,
+        repeats: Repeats = "answered",
         on_event: Callable[[Event], None] | None = None,
     ) -> Bus:
         """Open a device name or a URL of pyserial, by default at 115200 baud; the rest as for the class.
@@ -97,7 +101,16 @@ class Bus(BlockingMaster, MasterCalls):
             PortBusy: another program uses it, or this user lacks the permission.
         """
         port = open_port(name, baud=baud or BAUD)
-        return cls(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc, on_event=on_event)
+        return cls(
+            port,
+            attempts=attempts,
+            echo=echo,
+            health=health,
+            slack=slack,
+            crc=crc,
+            repeats=repeats,
+            on_event=on_event,
+        )
 
     def transact(self, request: Question, *, attempts: int | None = None, trial: bool = False) -> Reply:
         """As `BlockingMaster.transact`.
@@ -159,8 +172,7 @@ class Bus(BlockingMaster, MasterCalls):
         try:
             reply = self.transact(request)
         except FAILURES as error:
-            state.failed(error, fresh=fresh)
-            raise
+            return self.run(unanswered(state, request, error, fresh=fresh))
         state.settled(request)
         return reply
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from os import PathLike
+from typing import get_args
 
 from qlinkgen.codecs import qlink
 from qlinkgen.errors import CommandError
@@ -18,7 +20,7 @@ from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.procedure import Procedure
 from qlinkgen.link.transaction import Question
 from qlinkgen.protocols.qlink import loading, motion, pacing
-from qlinkgen.protocols.qlink.arguments import positive, whole
+from qlinkgen.protocols.qlink.arguments import known, positive, whole
 from qlinkgen.protocols.qlink.facts import BROADCAST, SYNCS
 from qlinkgen.protocols.qlink.hexfile import read_hex
 from qlinkgen.protocols.qlink.matching import ACCEPTS
@@ -55,9 +57,15 @@ class BusState:
         statuses: last motor status of each node, unless outdated by a later request.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, repeats: motion.Repeats = "answered") -> None:
+        """Make the state of a master that has just started.
+
+        Raises:
+            ValueError: `repeats` is another word.
+        """
+        known("repeats", repeats, get_args(motion.Repeats))
         self.statuses: dict[int, int] = {}
-        self.motions: defaultdict[int, motion.MotionState] = defaultdict(motion.MotionState)
+        self.motions = defaultdict[int, motion.MotionState](partial(motion.MotionState, repeats=repeats))
         self.syncs = pacing.SyncState()
 
     def next_sync(self, counter: int | None) -> int:

@@ -8,6 +8,10 @@ first one to a node: whether or not the node takes it for a repeat, the next num
 Without an answer, the words may be queued or not. They stay `pending`, and are sent again under the same
 number before any others, so that they are queued once in both cases. Clearing the FIFO and resetting the node
 drop them, as the node does.
+
+The document does not say whether a node answers a repeat. By default it does. With a node that stays silent
+instead (`Repeats`), a motion whose answer was lost would never end: if the node answers another request after
+all repeats stayed silent, it has taken the motion, and a motion without words brings the answer.
 """
 
 from __future__ import annotations
@@ -15,12 +19,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
+from typing import Literal, TypeAlias
 
 from qlinkgen.codecs import qlink
-from qlinkgen.errors import LinkError
+from qlinkgen.errors import LinkError, NoReply
 from qlinkgen.link.procedure import FAILURES, Ask, Pause, Procedure, Tell
 from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink.facts import MOTIONS, WORDS
+
+#: Whether nodes answer a repeated motion; `auto` finds out for each node with its first motion.
+Repeats: TypeAlias = Literal["answered", "silent", "auto"]
+#: Motions without words sent for the answer of one whose repeats stay silent.
+_ROUNDS = 3
 
 
 @dataclass(slots=True)
@@ -31,18 +41,22 @@ class MotionState:
         counter: number of the next motion.
         known: the node cannot take that number for a repeat.
         pending: an unanswered motion.
+        taken: the last motion that the node has taken.
         streaming: a stream uses the node exclusively.
+        repeats: whether the node answers repeats.
     """
 
     counter: int = 0
     known: bool = False
     pending: qlink.MotionRequest | None = None
+    taken: qlink.MotionRequest | None = None
     streaming: bool = False
+    repeats: Repeats = "answered"
 
     @property
     def ready(self) -> bool:
         """Whether a motion can be sent directly, without a pending or an empty one first."""
-        return self.known and self.pending is None and not self.streaming
+        return self.known and self.pending is None and not self.streaming and self.repeats != "auto"
 
     def begin(self, request: qlink.MotionRequest) -> bool:
         """Start sending a motion; return whether it is new."""
@@ -53,6 +67,7 @@ class MotionState:
     def settled(self, request: qlink.MotionRequest) -> None:
         """Record that the node has taken the motion."""
         self.pending = None
+        self.taken = request
         self.counter = MOTIONS.after(request.counter)
         self.known = True
 
@@ -102,10 +117,31 @@ def move(state: MotionState, request: qlink.MotionRequest) -> Procedure[Reply]:
 def _move(state: MotionState, request: qlink.MotionRequest) -> Procedure[Reply]:
     if state.pending is not None:
         yield from _settle(state, state.pending)
-    if not state.known:
-        yield from _settle(state, qlink.MotionRequest(node=request.node, outputs=request.outputs))
+    if not state.known or state.repeats == "auto":
+        yield from _settle(state, _empty(request))
+    if state.repeats == "auto":
+        yield from _find_out(state, request)
     request.counter = state.counter
     return (yield from _settle(state, request))
+
+
+def _empty(request: qlink.MotionRequest) -> qlink.MotionRequest:
+    """Return a motion without words and with the same outputs."""
+    return qlink.MotionRequest(node=request.node, outputs=request.outputs)
+
+
+def _find_out(state: MotionState, request: qlink.MotionRequest) -> Procedure[None]:
+    """Repeat the motion that was answered last, which has no words."""
+    repeat = _empty(request)
+    repeat.counter = MOTIONS.before(state.counter)
+    try:
+        yield Ask(repeat)
+    except NoReply as error:
+        if not error.attempts:
+            raise
+        state.repeats = "silent"
+    else:
+        state.repeats = "answered"
 
 
 def _settle(state: MotionState, request: qlink.MotionRequest) -> Procedure[Reply]:
@@ -114,10 +150,58 @@ def _settle(state: MotionState, request: qlink.MotionRequest) -> Procedure[Reply
     try:
         reply: Reply = yield Ask(request)
     except FAILURES as error:
-        state.failed(error, fresh=fresh)
-        raise
+        return (yield from unanswered(state, request, error, fresh=fresh))
     state.settled(request)
     return reply
+
+
+def unanswered(
+    state: MotionState, request: qlink.MotionRequest, error: Exception, *, fresh: bool
+) -> Procedure[Reply]:
+    """Find out whether a node that is silent on repeats has taken a motion that has failed.
+
+    Args:
+        state: state of the node.
+        request: the motion.
+        error: how it failed.
+        fresh: it was not pending before.
+
+    Returns the answer to a motion without words that was sent after it.
+
+    Raises the error if the motion stays pending.
+    """
+    rounds = 0
+    while (
+        state.repeats == "silent"
+        and isinstance(error, NoReply)
+        and error.attempts > fresh
+        and rounds < _ROUNDS
+    ):
+        rounds += 1
+        if not (yield from _answers(request.node)):
+            break
+        state.settled(request)
+        request = _empty(request)
+        request.counter = state.counter
+        fresh = state.begin(request)
+        try:
+            reply: Reply = yield Ask(request)
+        except FAILURES as later:
+            error = later
+        else:
+            state.settled(request)
+            return reply
+    state.failed(error, fresh=fresh)
+    raise error
+
+
+def _answers(node: int) -> Procedure[bool]:
+    """Return whether a node answers a request that changes nothing."""
+    try:
+        yield Ask(qlink.MotorPositionRequest(node=node))
+    except LinkError:
+        return False
+    return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +251,14 @@ class _Feed:
         if missing > 0 and not self.exhausted:
             self.batch.extend(islice(self.words, missing))
             self.exhausted = len(self.batch) < min(self.space, WORDS)
+
+    def took(self, request: qlink.MotionRequest) -> int:
+        """Record that the node has taken words; return their number."""
+        taken = len(request.segments)
+        self.queued += taken
+        self.space -= taken
+        del self.batch[:taken]
+        return taken
 
 
 def stream(
@@ -226,15 +318,15 @@ def _feed_once(feed: _Feed, patience: float) -> Procedure[bool]:
             reply = yield from _settle(feed.state, request)
     except LinkError as error:
         feed.in_doubt = request if feed.state.pending is request else None
+        if feed.state.taken is request:
+            feed.took(request)
         yield from _bear(feed, error, patience)
         return False
     feed.in_doubt = None
     feed.silent_since = None
-    taken = len(request.segments)
-    feed.queued += taken
-    del feed.batch[:taken]
+    taken = feed.took(request)
     answer: qlink.MotionResponse = reply.response
-    found_room = answer.fifo_space > feed.space - taken
+    found_room = answer.fifo_space > feed.space
     feed.space = answer.fifo_space
     feed.polled = True
     yield Tell(_progress(feed, answer))

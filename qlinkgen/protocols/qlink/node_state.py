@@ -35,6 +35,7 @@ class NodeState:
         product_id: product, 0..65535.
         serial_number: 0..4294967295.
         unsupported: commands that it does not answer.
+        silent_repeats: it does not answer a repeated motion.
         io: inputs and outputs.
         path: FIFO and motor.
         motor: requests passed to the motor.
@@ -62,6 +63,7 @@ class NodeState:
         motor_seconds: float = 0.05,
         check_program: bool = True,
         unsupported: Iterable[str] = (),
+        silent_repeats: bool = False,
         record: bool = False,
     ) -> None:
         """Make a node as after power-up.
@@ -82,6 +84,7 @@ class NodeState:
             motor_seconds: time until a motor_request is completed.
             check_program: whether it stops acknowledging a program load that is not Intel HEX.
             unsupported: names of commands that it does not answer.
+            silent_repeats: whether it does not answer a motion with the number of the last one.
             record: whether to keep every path word.
 
         Raises:
@@ -98,6 +101,7 @@ class NodeState:
         self.product_id = whole("product_id", product_id, 0, INFO["product_id"])
         self.serial_number = whole("serial_number", serial_number, 0, INFO["serial_number"])
         self.unsupported = known("unsupported", unsupported, qlink.COMMANDS)
+        self.silent_repeats = silent_repeats
         self.statistics = NodeStatistics()
         self.io = IoImage()
         self.path = PathFifo(capacity, rate, displacement, started=started)

@@ -138,6 +138,8 @@ class VirtualNode(NodeState, SlaveHandlers):
         now = self.advance(now)
         if request.counter == self._motion_counter:
             self.statistics.duplicates += 1
+            if self.silent_repeats:
+                return None
         elif not self._take_motion(request, now):
             return None
         return qlink.MotionResponse(
