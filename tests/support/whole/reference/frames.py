@@ -169,7 +169,7 @@ def _among(part: Part, names: Collection[str]) -> Part:
 
 def _ended(part: Part, end: bytes, coded: Collection[str]) -> Part:
     """A part whose texts do not have the bytes that end a frame, unless a coding hides them."""
-    if part.name in coded:
+    if part.name in coded or all(kind.without is None for *_, kind in part.values):
         return part
     return replace(
         part,
