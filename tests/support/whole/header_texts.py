@@ -14,10 +14,10 @@ _KEPT = ("if", "type")
 def add(rng: random.Random, parts: Doc) -> None:
     """Let some values of a frame be texts, if nothing else depends on them."""
     end = next((spec.get("value", "") for spec in parts.values() if spec.get("role") == "terminator"), "")
-    others = str([{key: each for key, each in spec.items() if key != "over"} for spec in parts.values()])
+    others = " ".join(f"{spec.get('equals', '')} {spec.get('if', '')}" for spec in parts.values())
     for name, spec in parts.items():
         told = spec.keys() - {"byteorder", "range", "scale", "offset", "default", "unit", *_KEPT}
-        if told or "type" not in spec or f"{name}'" in others or f" {name}" in others or rng.random() < 0.6:
+        if told or "type" not in spec or name in others or rng.random() < 0.6:
             continue
         size = rng.choice((1, 2, 2, 3, 4, 5, 8))
         letters = [each for each in "GPabc 0~" if f"{ord(each):02X}" not in end]
