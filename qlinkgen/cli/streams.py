@@ -233,7 +233,7 @@ def _ends_alike(frame: FramePlan) -> bool:
     """Whether the boundaries of frames are independent of the direction."""
     match frame.end:
         case ByKind():
-            return all(map(_ends_alike, frame.kinds))
+            return not any(each.only for each in frame.kinds) and all(map(_ends_alike, frame.kinds))
         case ByLength() | ByTerminator():
             return bool(frame.envelope.starts)
         case ByMark() | BySilence():

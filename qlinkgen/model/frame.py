@@ -241,7 +241,7 @@ class DelimitedFrame:
             return self
         parts = tuple(part for part in self.parts if part.only in (None, direction))
         names = frozenset(part.name for part in parts)
-        return replace(self, parts=tuple(part.among(names) for part in parts))
+        return replace(self, parts=tuple(replace(part.among(names), only=None) for part in parts))
 
     def part(self, role: Role) -> Part | None:
         """The first part with a role."""
@@ -436,16 +436,30 @@ class PacketFrame:
 
 @dataclass(frozen=True)
 class FrameKind:
-    """One of several kinds of frame; those of one ``family`` carry the same messages."""
+    """One of several kinds of frame; those of one ``family`` carry the same messages.
+
+    Attributes:
+        name: what messages call it.
+        frame: the frame, without parts of one direction.
+        only: the direction whose messages it carries, None for both.
+        own: a name of its own, if it is one of two that describe a kind with parts of one direction.
+    """
 
     name: str
     frame: DelimitedFrame
     family: int
+    only: Direction | None = None
+    own: str = ""
+
+    @property
+    def title(self) -> str:
+        """The name that no other kind has."""
+        return self.own or self.name
 
 
 @dataclass(frozen=True)
 class FrameKinds:
-    """Several kinds of frame, told apart by the constants that they begin with.
+    """Several kinds of frame, told apart by the constants that they begin with, and by their direction.
 
     The id of a message is its number in the frame, and above that the number of its family.
     """
@@ -453,6 +467,10 @@ class FrameKinds:
     kinds: tuple[FrameKind, ...]
 
     kind = "kinds"
+
+    def towards(self, direction: str) -> tuple[FrameKind, ...]:
+        """The kinds that a message of a direction may have."""
+        return tuple(each for each in self.kinds if each.only in (None, direction))
 
     @cached_property
     def number_bits(self) -> int:

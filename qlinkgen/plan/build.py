@@ -62,7 +62,7 @@ def _carrying(stated: Frame, frame: FramePlan, message: Message) -> tuple[FrameP
     """The kinds of frame that carry a message, the shortest first."""
     if not isinstance(stated, FrameKinds):
         return (frame,)
-    names = {each.name for each in stated.carrying(message.id)}
+    names = {each.title for each in stated.carrying(message.id)}
     kinds = [each for each in frame.kinds if each.name in names]
     return tuple(sorted(kinds, key=lambda each: each.envelope.payload.most))
 

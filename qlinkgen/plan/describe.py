@@ -602,7 +602,8 @@ def _start_text(kind: FramePlan) -> str:
 def receiver_text(frame: FramePlan) -> tuple[str, str]:
     """The strategy of a receiver, and its reason."""
     way = frame.receiver
-    preamble = " or ".join(each for kind in frame.every if (each := _start_text(kind)))
+    beginnings = dict.fromkeys(each for kind in frame.every if (each := _start_text(kind)))
+    preamble = " or ".join(beginnings)
     match way:
         case Hunt():
             return "hunt", (

@@ -86,6 +86,7 @@ class FramePlan:
         kinds: the kinds of frame, () if there is one; each with its own ``envelope``.
         name: name of the kind, "" if there is one.
         base: what is added to the number of a message in frames of this kind.
+        only: the direction that frames of this kind go, None for both.
         doc: what the document says of it; "" if there are several kinds, each of which has its own.
         section: where the document says so.
     """
@@ -100,8 +101,14 @@ class FramePlan:
     kinds: tuple[FramePlan, ...] = ()
     name: str = ""
     base: int = 0
+    only: Direction | None = None
     doc: Text = ""
     section: Text = ""
+
+    def towards(self, direction: Direction) -> FramePlan:
+        """The kinds of frame of a direction."""
+        found = tuple(each for each in self.kinds if each.only in (None, direction))
+        return self if found == self.kinds else _several(found)
 
     @property
     def every(self) -> tuple[FramePlan, ...]:
@@ -227,7 +234,7 @@ class FramePlan:
 
 
 def frame_plan(frame: Frame, direction: Direction = "response") -> FramePlan:
-    """Plan the frames of a direction of a protocol."""
+    """Plan the frames of a direction of a protocol; of several kinds, those of both."""
     match frame:
         case DelimitedFrame():
             return _delimited(frame, direction)
@@ -236,7 +243,7 @@ def frame_plan(frame: Frame, direction: Direction = "response") -> FramePlan:
         case PacketFrame():
             return _packet(frame, direction)
         case FrameKinds():
-            return _kinds(frame, direction)
+            return _several(_kinds(frame))
         case _:
             assert_never(frame)
 
@@ -244,17 +251,29 @@ def frame_plan(frame: Frame, direction: Direction = "response") -> FramePlan:
 def frame_plans(frame: Frame) -> Mapping[Direction, FramePlan]:
     """The frames of each direction; directions with the same frame share one object."""
     response = frame_plan(frame)
+    if isinstance(frame, FrameKinds):
+        return {
+            "request": response.towards("request"),
+            "response": response.towards("response"),
+            "message": response,
+        }
     same = not (isinstance(frame, PacketFrame) or (isinstance(frame, DelimitedFrame) and frame.directed))
     request = response if same else frame_plan(frame, "request")
     return {"request": request, "response": response, "message": request}
 
 
-def _kinds(frame: FrameKinds, direction: Direction) -> FramePlan:
-    """Several kinds: each has a plan of its own."""
-    kinds = tuple(
-        replace(_delimited(each.frame, direction), name=each.name, base=frame.base(each.family))
+def _kinds(frame: FrameKinds) -> tuple[FramePlan, ...]:
+    """Each kind has a plan of its own."""
+    return tuple(
+        replace(
+            _delimited(each.frame, "response"), name=each.title, base=frame.base(each.family), only=each.only
+        )
         for each in frame.kinds
     )
+
+
+def _several(kinds: tuple[FramePlan, ...]) -> FramePlan:
+    """Frames of several kinds."""
     receivers = [each.receiver for each in kinds]
     return FramePlan(
         envelope=Envelope(()),

@@ -122,13 +122,23 @@ class Plan:
 
     @property
     def frame(self) -> FramePlan:
-        """The frame of responses; in most protocols every direction has the same."""
-        return self.frames["response"]
+        """The frame of responses, or all kinds of frame; in most protocols every direction has the same."""
+        return self.frames["message" if self.frames["message"].kinds else "response"]
 
     @property
     def directed(self) -> bool:
-        """Whether parts of frames are only in those of one direction, though both are found alike."""
-        return self.frames["request"] is not self.frame and not self.frame.needs_request
+        """Whether parts of the only frame are in one direction alone, though both are found alike."""
+        several = bool(self.frame.kinds)
+        return self.frames["request"] is not self.frame and not self.frame.needs_request and not several
+
+    @property
+    def parted(self) -> bool:
+        """Whether some kinds of frame go one direction alone."""
+        return any(each.only for each in self.frame.kinds)
+
+    def around(self, direction: Direction) -> FramePlan:
+        """The frame of a direction, or all kinds of frame: its address and values are those of functions."""
+        return self.frame if self.frame.kinds else self.frames[direction]
 
     @property
     def ways(self) -> Mapping[str, Plan]:

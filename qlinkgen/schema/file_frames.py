@@ -318,3 +318,6 @@ class KindSpec(Fact):
     """One of several kinds of frame."""
 
     parts: Parts = Field(min_length=1, description="Parts in wire order; the first is a constant")
+    when: AnyCondition | None = Field(
+        default=None, alias="if", description="Direction of its frames: {direction: request}, or response"
+    )

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from qlinkgen.model.frame import DelimitedFrame, FrameKind, FrameKinds, Part, PartBits
+from qlinkgen.model.frame import DelimitedFrame, Direction, FrameKind, FrameKinds, Part, PartBits
 from qlinkgen.model.message import Message
 from qlinkgen.schema.file_commands import AnswerSpec, StepMessageSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.frames import FrameBuilder
 from qlinkgen.schema.notation import shown
+from qlinkgen.schema.part_directions import stated_direction
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
@@ -53,23 +54,35 @@ def build_kinds(file: SchemaFile, builder: FrameBuilder, report: Reporter) -> Fr
     if "frame" in file.model_fields_set:
         what, hint = "the protocol has a frame and kinds of frame", "write its frame as one of the kinds"
         report.error(_RULE, ("frames",), what, hint, of_key=True)
+    built = list(_built(file, builder, report))
+    if len(built) < len(file.frames) or report.failed:
+        report.taint(("frame",))
+    if len(built) < len(file.frames):
+        return None
     named = {name for name, _ in named_kinds(file)}
-    families = list(dict.fromkeys(name if name in named else "" for name in file.frames))
-    found = []
-    for name, spec in file.frames.items():
-        frame = builder.kind(name, spec)
-        if frame is None:
-            report.taint(("frame",))
-            return None
-        found.append(FrameKind(name, frame, families.index(name if name in named else "")))
-    kinds = FrameKinds(tuple(found))
+    ways = [(name, frame, way) for name, frame, only in built for way in _ways(frame, only)]
+    families = list(dict.fromkeys((name if name in named else "", way) for name, _, way in ways))
+    kinds = FrameKinds(
+        tuple(
+            FrameKind(
+                name,
+                frame.towards(way) if way else frame,
+                families.index((name if name in named else "", way)),
+                way,
+                f"{name}_{way}" if frame.directed else "",
+            )
+            for name, frame, way in ways
+        )
+    )
     checker = _Checker(report)
-    for each in found:
-        checker.kind(each)
-    checker.addresses(found)
-    checker.values(found)
+    for name, frame, _ in built:
+        checker.kind(name, frame)
+    checker.addresses(kinds.kinds)
+    checker.values(kinds.kinds)
+    checker.titles(kinds.kinds)
+    checker.shared([each for each in kinds.kinds if each.name not in named])
     for family in range(len(families)):
-        checker.family([each for each in found if each.family == family])
+        checker.family([each for each in kinds.kinds if each.family == family])
     return kinds
 
 
@@ -88,6 +101,26 @@ def begun(kinds: FrameKinds, messages: list[Message], report: Reporter) -> Frame
     return FrameKinds(tuple(found))
 
 
+def _built(
+    file: SchemaFile, builder: FrameBuilder, report: Reporter
+) -> Iterator[tuple[str, DelimitedFrame, Direction | None]]:
+    """The kinds with their names, and the direction that each has as a whole."""
+    for name, spec in file.frames.items():
+        frame, only, place = builder.kind(name, spec), None, ("frames", name, "if")
+        if spec.when is not None:
+            only = stated_direction(spec.when, f"which frames are {name}", place, report)
+        if frame and frame.directed and only:
+            what = f"{name} and parts of it are only in one direction"
+            report.error(_RULE, place, what, "remove one of the conditions", of_key=True)
+        if frame is not None:
+            yield name, frame, only
+
+
+def _ways(frame: DelimitedFrame, only: Direction | None) -> Sequence[Direction | None]:
+    """The directions for which a kind is one of its own: both if parts of it are only in one of them."""
+    return frame.ways if frame.directed else (only,)
+
+
 def family_frame(kinds: FrameKinds, family: int) -> DelimitedFrame:
     """The largest frame of a family, with a payload of any size that one of its kinds has."""
     members = [each.frame for each in kinds.kinds if each.family == family]
@@ -100,11 +133,12 @@ def check_used(kinds: FrameKinds, messages: list[Message], report: Reporter) -> 
     """Check that each kind carries a message, and which kinds only answers may have."""
     used = {each.name for message in messages for each in kinds.carrying(message.id)}
     _check_repeated(kinds, messages, report)
-    for kind in kinds.kinds:
-        if kind.name not in used:
-            what = f"no message has frame: {kind.name}"
+    for name in dict.fromkeys(each.name for each in kinds.kinds):
+        if name not in used:
+            what = f"no message has frame: {name}"
             hint = "remove it, or let a message name it"
-            report.error(_RULE, ("frames", kind.name), what, hint, of_key=True, needs=(("commands",),))
+            report.error(_RULE, ("frames", name), what, hint, of_key=True, needs=(("commands",),))
+    for kind in kinds.kinds:
         for message in messages:
             asks = message.direction != "response" and kind in kinds.carrying(message.id)
             if asks and kinds.address and not kind.frame.address:
@@ -147,38 +181,37 @@ class _Checker:
     def _error(self, path: Path, what: str, hint: str) -> None:
         self._report.error(_RULE, path, what, hint, of_key=True, needs=(path[:2],))
 
-    def kind(self, kind: FrameKind) -> None:
+    def kind(self, name: str, frame: DelimitedFrame) -> None:
         """Check that a kind has only what kinds may have."""
-        path: Path = ("frames", kind.name, "parts")
-        first = kind.frame.parts[0].name
-        if kind.frame.leading is not None:
-            if kind.frame.part("terminator"):
-                what = f"{kind.name} begins with its message id and ends with a terminator"
+        path: Path = ("frames", name, "parts")
+        first = frame.parts[0].name
+        if frame.leading is not None:
+            if frame.part("terminator"):
+                what = f"{name} begins with its message id and ends with a terminator"
                 self._error((*path, first), what, "begin it with a constant, or give it a length")
-        elif not kind.frame.preamble:
-            what = f"{kind.name} begins with {first}, not with constant bytes"
+        elif not frame.preamble:
+            what = f"{name} begins with {first}, not with constant bytes"
             hint = "begin each kind with a constant that tells it from the others, or with the message id"
             self._error((*path, first), what, hint)
-        if kind.frame.idle:
-            what = f"an idle line ends frames of {kind.name}"
+        if frame.idle:
+            what = f"an idle line ends frames of {name}"
             self._error(path, what, "remove it; a length or the message gives the end of a kind of frame")
-        if kind.frame.directed:
-            what = f"parts of {kind.name} are only in one direction"
-            self._error(path, what, "write two kinds, one for each direction")
-        end = kind.frame.part("terminator")
-        if end is not None and end.constant == kind.frame.preamble:
-            what = f"{kind.name} begins with the bytes that end it"
+        end = frame.part("terminator")
+        if end is not None and end.constant == frame.preamble:
+            what = f"{name} begins with the bytes that end it"
             self._error((*path, end.name), what, "let it begin with other bytes")
-        for part in kind.frame.parts:
+        for part in frame.parts:
             if wrong := _excess(part):
-                what = f"{part.name} of {kind.name} {wrong}, which kinds of frame do not have"
+                what = f"{part.name} of {name} {wrong}, which kinds of frame do not have"
                 hint = "remove it, or describe the kind in a file of its own"
                 self._error((*path, part.name), what, hint)
 
-    def starts(self, kinds: list[FrameKind]) -> None:
-        """Check that no kind begins like another."""
+    def starts(self, kinds: Sequence[FrameKind]) -> None:
+        """Check that no kind begins like another whose frames go the same direction."""
         for index, kind in enumerate(kinds):
             for other in kinds[:index]:
+                if kind.only and other.only and kind.only != other.only:
+                    continue
                 pairs = itertools.product(kind.frame.starts, other.frame.starts)
                 alike = (each for each in pairs if each[0].startswith(each[1]) or each[1].startswith(each[0]))
                 if (same := next(alike, None)) is not None:
@@ -188,7 +221,7 @@ class _Checker:
                     hint = f"a receiver cannot tell them apart; use other constants{' or ids' if ids else ''}"
                     self._error(("frames", kind.name), what, hint)
 
-    def addresses(self, kinds: list[FrameKind]) -> None:
+    def addresses(self, kinds: Sequence[FrameKind]) -> None:
         """Check that the address is the same in all kinds that have one."""
         having = [(kind, kind.frame.address) for kind in kinds if kind.frame.address]
         for kind, address in having[1:]:
@@ -200,7 +233,7 @@ class _Checker:
                 what += f"that of {having[0][0].name} {first.name} of {first.bits}"
                 self._error(("frames", kind.name), what, "give both the same name and size")
 
-    def values(self, kinds: list[FrameKind]) -> None:
+    def values(self, kinds: Sequence[FrameKind]) -> None:
         """Check that kinds have the same values under one name, and cover the same attributes."""
         known: dict[str, tuple[FrameKind, PartBits]] = {}
         for kind in kinds:
@@ -220,6 +253,24 @@ class _Checker:
             if kind.frame.attributes != seeded[0].frame.attributes:
                 what = f"check values of {kind.name} and {seeded[0].name} cover different attributes"
                 self._error(("frames", kind.name), what, "let both cover the same, in the same order")
+
+    def titles(self, kinds: Sequence[FrameKind]) -> None:
+        """Check that generated code can tell a kind from the frames of one direction of another."""
+        known: dict[str, FrameKind] = {}
+        for kind in kinds:
+            other = known.setdefault(kind.title, kind)
+            if other.name != kind.name:
+                what = f"{kind.title} is the name of a kind, and of the {kind.only or other.only}s of another"
+                self._error(("frames", kind.title), what, "give it another name")
+
+    def shared(self, kinds: Sequence[FrameKind]) -> None:
+        """Check that kinds that no message names are for both directions, or each for one."""
+        both = next((each for each in kinds if each.only is None), None)
+        if both and (one := next((each for each in kinds if each.only), None)):
+            what = (
+                f"{one.name} is for one direction or has parts of one, {both.name} carries the same messages"
+            )
+            self._error(("frames", one.name), what, "let each message name its frame")
 
     def family(self, kinds: list[FrameKind]) -> None:
         """Check kinds that carry the same messages: only constants, lengths and check values differ."""

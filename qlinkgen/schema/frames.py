@@ -163,7 +163,7 @@ class FrameBuilder:
         if not all(self._fits(whole.towards(each), path) for each in whole.ways):
             return None
         if whole.directed:
-            check_directions(whole, specs, self._report)
+            check_directions(whole, specs, path, self._report)
         return whole
 
     def _fits(self, frame: DelimitedFrame, path: Path) -> bool:

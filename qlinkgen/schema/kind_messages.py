@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from qlinkgen.model.frame import Frame, FrameKinds, PartBits
-from qlinkgen.model.message import Message
+from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.transaction import Addressing, Bus
 from qlinkgen.schema.fields import FieldBuilder
 from qlinkgen.schema.file_base import Fact
@@ -13,7 +13,7 @@ from qlinkgen.schema.file_commands import CommandSpec, MessageSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.frame_kinds import family_frame, named_kinds
 from qlinkgen.schema.frames import payload_bounds
-from qlinkgen.schema.messages import MessageBuilder, Written
+from qlinkgen.schema.messages import MessageBuilder, Written, sent_by
 from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.types import TypeBuilder
@@ -26,20 +26,24 @@ class KindMessages:
         self, file: SchemaFile, report: Reporter, types: TypeBuilder, kinds: FrameKinds, bus: Bus
     ) -> None:
         """``types`` are those of fields."""
+        self._file = file
         self._report = report
         self._kinds = kinds
         self.places: dict[str, Path] = {}
         self.id_places: dict[str, Path] = {}
         self._builders: dict[int, MessageBuilder] = {}
-        self._families = {each.name: each.family for each in kinds.kinds}
+        named = {kind for kind, _ in named_kinds(file)}
+        #: The family of each kind that messages name, None for all others, by the direction that it goes.
+        self._families: dict[str | None, dict[str | None, int]] = {}
+        for each in kinds.kinds:
+            name = each.name if each.name in named else None
+            self._families.setdefault(name, {})[each.only] = each.family
         for family in sorted({each.family for each in kinds.kinds}):
             frame = family_frame(kinds, family)
             fields = FieldBuilder(file, report, types, frame.payload.max_size)
             builder = MessageBuilder(file, report, fields, frame, bus, base=kinds.base(family))
             builder.places, builder.id_places = self.places, self.id_places
             self._builders[family] = builder
-        named = {kind for kind, _ in named_kinds(file)}
-        self._shared = next((f for name, f in self._families.items() if name not in named), None)
 
     @property
     def addressed(self) -> bool:
@@ -60,7 +64,8 @@ class KindMessages:
         self, name: str, spec: CommandSpec, layout: Written, *, addressing: Addressing, section: str
     ) -> Message:
         """Request or response of a command."""
-        return self._of(layout.kind, ("commands", name)).directed(
+        direction: Direction = "request" if layout.part == "request" else "response"
+        return self._of(layout.kind, ("commands", name), direction, f"{name}.{direction}").directed(
             name, spec, layout, addressing=addressing, section=section
         )
 
@@ -74,23 +79,32 @@ class KindMessages:
         direction: Literal["request", "response"] = "response",
     ) -> Message:
         """An answer other than the response, or a step; ``command`` is "" if it is that of all."""
-        return self._of(layout.kind, layout.path).reply(
+        return self._of(layout.kind, layout.path, direction, layout.part).reply(
             command, spec, layout, addressing=addressing, direction=direction
         )
 
     def single(self, name: str, spec: MessageSpec) -> Message:
         """A message without a response."""
-        return self._of(spec.frame, ("messages", name)).single(name, spec)
+        direction = sent_by(self._file, spec)
+        return self._of(spec.frame, ("messages", name), direction, name).single(name, spec)
 
-    def _of(self, kind: str | None, path: Path) -> MessageBuilder:
-        """The builder of the messages of a kind."""
-        if kind in self._families:
-            return self._builders[self._families[kind or ""]]
-        if kind is None and self._shared is None:
+    def _of(self, kind: str | None, path: Path, direction: Direction, whose: str) -> MessageBuilder:
+        """The builder of the messages of a kind that go a direction; ``whose`` is the name of one."""
+        found = self._families.get(kind, {})
+        family = found.get(direction, found.get(None))
+        if kind is None and not found:
             what = f"{path[-1]} does not name the kind of its frame"
-            hint = f"add frame: {listed(self._families, 'or')}"
+            hint = f"add frame: {listed([each for each in self._families if each], 'or')}"
             self._report.error("bad-kinds", path, what, hint, of_key=True, absent=True)
-        return self._builders[self._shared or 0]
+        elif found and family is None:
+            only = listed([str(each) for each in found], "or")
+            what = f"{whose} is a {direction}, but frames of its kind are only {only}s"
+            hint = "let it name another kind"
+            if direction == "message":
+                what = f"{whose} has no direction, which its frame states"
+                hint = f"add direction: {only}"
+            self._report.error("bad-kinds", path, what, hint, of_key=True)
+        return self._builders[next(iter(found.values()), 0) if family is None else family]
 
 
 AnyMessages = MessageBuilder | KindMessages

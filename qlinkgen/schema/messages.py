@@ -247,15 +247,12 @@ class MessageBuilder:
     def _sent(self, name: str, spec: MessageSpec) -> Direction:
         """The direction of a message outside of commands: stated, or by the side of a link that sends it."""
         place: Path = ("messages", name, "from")
-        if spec.side is None:
-            return spec.direction or "message"
-        if spec.direction is not None:
+        if spec.side is not None and spec.direction is not None:
             what, needs = f"{name} has a side and a direction", (place, ("bus",))
             self._report.error("bad-link", place, what, "remove one of them", of_key=True, needs=needs)
-        else:
+        elif spec.side is not None:
             check_side(self._file, name, spec.side, place, self._report)
-        sides = self._file.bus.sides or []
-        return "response" if spec.side in sides[1:] else "request"
+        return sent_by(self._file, spec)
 
     def _addresses(
         self, addressing: Addressing, direction: Direction
@@ -449,3 +446,10 @@ def _why_not_empty(message: Message) -> str:
     if any(field.terminated for field in message.fields):
         return "a terminator"
     return "records of variable size" if any(field.walked for field in message.fields) else ""
+
+
+def sent_by(file: SchemaFile, spec: MessageSpec) -> Direction:
+    """The direction of a message outside of commands: stated, or by the side of a link that sends it."""
+    if spec.side is None:
+        return spec.direction or "message"
+    return "response" if spec.side in (file.bus.sides or [])[1:] else "request"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import get_args
 
 from qlinkgen.model.frame import DelimitedFrame, Direction, Part
 from qlinkgen.schema.file_frames import PartSpec
+from qlinkgen.schema.notation import TestText
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 
@@ -26,21 +27,29 @@ def direction_of(spec: PartSpec, report: Reporter, path: Path) -> Direction | No
         what = f"frames without {name} would have no {common}"
         report.error(_RULE, place, what, "remove the condition", of_key=True)
         return None
-    if len(spec.when) == 1 and spec.when[0].field == "direction":
-        test = spec.when[0]
+    return stated_direction(spec.when, f"whether a frame has {name}", place, report)
+
+
+def stated_direction(
+    when: Sequence[TestText], decided: str, place: Path, report: Reporter
+) -> Direction | None:
+    """The direction that a condition states, None after an error; ``decided`` is what it decides."""
+    if len(when) == 1 and when[0].field == "direction":
+        test = when[0]
         named = {wanted.name for wanted in test.wanted}
         found = [each for each in _DIRECTIONS if (each in named) != test.negated]
         if named <= {*_DIRECTIONS} and len(found) == 1:
             return found[0]
-    what = f"the direction and nothing else must decide whether a frame has {name}"
+    what = f"the direction and nothing else must decide {decided}"
     hint = "write {direction: request} or {direction: response}, or name other values"
     report.error(_RULE, place, what, hint, of_key=True)
     return None
 
 
-def check_directions(frame: DelimitedFrame, specs: Mapping[str, PartSpec], report: Reporter) -> None:
+def check_directions(
+    frame: DelimitedFrame, specs: Mapping[str, PartSpec], path: Path, report: Reporter
+) -> None:
     """Check that the frames of both directions can be made, and found by one receiver."""
-    path: Path = ("frame", "parts")
     for part in frame.parts:
         for key, whole in (("over", specs[part.name].over), ("counts", specs[part.name].counts)):
             ways = [frame.towards(each) for each in _DIRECTIONS if part.only in (None, each)]
@@ -55,7 +64,8 @@ def check_directions(frame: DelimitedFrame, specs: Mapping[str, PartSpec], repor
         if source and source.only and source.only != part.only and not both:
             what = f"{part.name} follows from {source.name}, which only a {source.only} has"
             report.error(_RULE, (*path, part.name, "equals"), what, "give both the same if", of_key=True)
-    if not report.failed:
+    # Each of several kinds has a search of its own for each direction.
+    if path[0] == "frame" and not report.failed:
         _check_search(frame, report)
 
 

@@ -140,3 +140,61 @@ def test_a_byte_refuses_every_command() -> None:
         refused = drive(MasterEngine(codec, Timing.of(codec, host_slack=SLACK)), request, [(0.02, b"\x1f")])
         assert isinstance(refused.error, Refused)
         assert refused.error.reply == codec.Nack()
+
+
+PARTED = """
+qlinkgen: 1
+protocol: {name: parted, revision: "1", source: Made up}
+byteorder: big
+frames:
+  short:
+    parts:
+      start: 10
+      code: {role: message, type: u8}
+      node: {role: address, type: u8}
+      state: {type: u8, bits: {error: 0..6, busy: 7}, if: {direction: response}}
+      data: {role: payload, size: 0..4}
+      sum: {type: u8, algorithm: sum8, over: [code, node, state, data]}
+  ask:
+    if: {direction: request}
+    parts:
+      start: A5
+      code: {role: message, type: u8}
+      node: {role: address, type: u8}
+      data: {role: payload, size: 0..4}
+  tell:
+    if: {direction: response}
+    parts:
+      start: A5 5A
+      length: {type: u8, counts: data}
+      node: {role: address, type: u8}
+      code: {role: message, type: u8}
+      data: {role: payload, size: 0..100}
+bus: {kind: master_slave, nodes: 1..8, baud: 9600, response_within: 50 ms}
+defaults: {addressing: node, repeat: safe}
+commands:
+  begin: {id: 1, frame: short, request: {speed: u8}, response: {position: u16}}
+  scan: {id: 2, request: {}, response: {points: "u16[0..50]"}}
+"""
+
+
+def test_kinds_of_one_direction_begin_alike_and_share_messages() -> None:
+    protocol, faults = loads(PARTED, "parted.yaml")
+    assert protocol is not None, faults
+    codec = load_codec(protocol)
+    wire = Wire(baud=9600)
+    wire.attach(SlaveEngine(codec, GenericNode(codec, 3), turnaround=0.001), "node 3")
+    master = BlockingMaster(MasterEngine(codec, Timing.of(codec, host_slack=SLACK)), VirtualPort(wire))
+    assert master.transact(codec.BeginRequest(node=3, speed=9)).response.node == 3
+    assert master.transact(codec.ScanRequest(node=3)).response.node == 3
+    assert codec.BeginRequest(node=3, speed=9).to_frame() == bytes.fromhex("10 01 03 09 0D")
+    answer = codec.BeginResponse(node=3, busy=True, position=1)
+    assert answer.to_frame() == bytes.fromhex("10 01 03 80 00 01 85")
+    assert codec.decode_response(answer.to_frame()) == answer
+    with pytest.raises(codec.DecodeError):
+        codec.decode_request(answer.to_frame())
+    # The bytes of an answer that a receiver of requests takes for a request, and the other way round.
+    assert codec.decode_request(bytes.fromhex("A5 02 05")) == codec.ScanRequest(node=5)
+    told = codec.ScanResponse(node=5, points=[0xA502])
+    assert told.to_frame() == bytes.fromhex("A5 5A 02 05 02 A5 02")
+    assert codec.StreamDecoder("response").feed(b"\xa5" + told.to_frame()) == [told]

@@ -202,12 +202,13 @@ def _both(first: str, second: str) -> str:
 
 def address_of(plan: Plan, name: str, direction: Direction = "response") -> Address:
     """The address of the frames of a direction; one that shares a byte has the type of a byte."""
-    values = plan.frames[direction].values
+    frame = plan.around(direction)
+    values = frame.values
     refused = [
         test
         for each in values.values()
         for test in refused_when_received(each.number, f"frame->parts.{member(each.name)}")
     ]
     kind = f"{plan.protocol.name}_parts_t" if values else ""
-    sizes = [bits.bits for each in plan.frames[direction].every for bits in each.envelope.address[:1]]
+    sizes = [bits.bits for each in frame.every for bits in each.envelope.address[:1]]
     return Address(name, sizes[0] if sizes else 8, kind, tuple(refused))

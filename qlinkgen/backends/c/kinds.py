@@ -35,6 +35,7 @@ class KindView:
     Attributes:
         name: its name.
         carries: the condition on ``id`` and ``size`` of what it carries.
+        goes: the condition for the direction of a receiver, "" if both have the kind.
         parameters: those of the function that wraps, for number, address and values.
         arguments: what is passed to it.
         id: the expression for the message id of a received frame.
@@ -51,6 +52,7 @@ class KindView:
 
     name: str
     carries: str
+    goes: str
     parameters: str
     arguments: str
     id: str
@@ -84,6 +86,11 @@ class KindsView:
     overhead: int
 
     @property
+    def parted(self) -> bool:
+        """Whether some kinds go one direction alone."""
+        return any(each.goes for each in self.kinds)
+
+    @property
     def lasts(self) -> Sequence[str]:
         """The last bytes of terminators."""
         return list(dict.fromkeys(each.ended.last for each in self.kinds if each.ended))
@@ -115,28 +122,38 @@ def kinds_views(plan: Plan, layouts: Layouts) -> KindsViews:
         ),
         parts=replace(
             first,
-            judged=_unproven(plan.frame, plan.protocol.name),
+            judged=_unproven(plan),
             index_type=unsigned_type(max(16, plan.frame.max_wire.bit_length())),
             max_frame=f"{plan.frame.longest}U",
         ),
     )
 
 
-def _unproven(frame: FramePlan, prefix: str) -> str:
+def _unproven(plan: Plan) -> str:
     """The condition for a received frame of a kind without check value, "" if all have one."""
     terms = []
-    for kind in frame.kinds:
-        if not kind.envelope.checks and not kind.envelope.preamble:
+    for kind in plan.frame.kinds:
+        if kind.envelope.checks:
+            continue
+        goes = _goes(plan, kind, "receiver->direction")
+        if not kind.envelope.preamble:
             held = "&receiver->wire[receiver->first], (size_t)receiver->filled - receiver->first"
-            terms.append(f"{prefix}_begins_{kind.name}_({held})")
-        elif not kind.envelope.checks:
+            tests = [f"{plan.protocol.name}_begins_{kind.name}_({held})"]
+        else:
             offsets = ["", *(f" + {at}U" for at in range(1, len(kind.envelope.preamble)))]
             tests = [
                 f"(receiver->wire[receiver->first{offset}] == {in_hex(byte)})"
                 for offset, byte in zip(offsets, kind.envelope.preamble, strict=True)
             ]
-            terms.append(" && ".join(tests) if len(tests) == 1 else f"({' && '.join(tests)})")
+        if goes := _goes(plan, kind, "receiver->direction"):
+            tests.append(f"({goes})")
+        terms.append(" && ".join(tests) if len(tests) == 1 else f"({' && '.join(tests)})")
     return " || ".join(terms)
+
+
+def _goes(plan: Plan, kind: FramePlan, direction: str) -> str:
+    """The condition for the direction of a kind, "" if it goes both."""
+    return f"{direction} == {plan.protocol.name.upper()}_{kind.only.upper()}" if kind.only else ""
 
 
 def _writer(plan: Plan, kind: FramePlan, layouts: Layouts) -> PartWriter:
@@ -174,6 +191,7 @@ def _kind(
     return KindView(
         name=kind.name,
         carries=_carries(plan.frame, kind, bits),
+        goes=_goes(plan, kind, "direction"),
         parameters=sender.parameters,
         arguments=_arguments(kind, frame, sender.id_type, sender.address),
         id=number,

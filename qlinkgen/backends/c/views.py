@@ -126,7 +126,8 @@ def directed(plan: Plan) -> bool:
         case Gaps():
             needed = plan.directed or _uses_direction(plan.frame)
         case Rescan():
-            needed = plan.directed or not receiver.verified or _uses_direction(plan.frame)
+            apart = plan.directed or plan.parted
+            needed = apart or not receiver.verified or _uses_direction(plan.frame)
         case Marks():
             needed = True
         case _:

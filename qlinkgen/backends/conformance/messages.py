@@ -173,7 +173,7 @@ class Entries:
         function, stem = header.function(message), naming.member(header.stem(message))
         store = f"&{self.store}{stem}, " if message.values else ""
         address = "address, " if header.address else ""
-        address += "&store.parts, " if self._plan.frames[plan.direction].values else ""
+        address += "&store.parts, " if self._plan.around(plan.direction).values else ""
         part = "request_sum, " if header.sum_bits and plan.direction == "response" else ""
         decode = f"decode({store}" if framed else f"from_frame({store}{part}"
         handled, called = self._has_handler(plan), self._has_callback(plan)

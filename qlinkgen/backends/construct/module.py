@@ -208,7 +208,7 @@ def _kind_layout(kind: FramePlan) -> str:
 def _kinds(plan: Plan, direction: Direction, messages: Mapping[str, str]) -> Call:
     """The kinds of frame of a direction, the shortest first."""
     calls: list[Node] = []
-    for kind in sorted(plan.frame.kinds, key=lambda each: each.max_payload):
+    for kind in sorted(plan.frames[direction].kinds, key=lambda each: each.max_payload):
         carried = [each for each in plan.received(direction) if kind in each.frames]
         chosen = Sequence(tuple(Ref(messages[each.name]) for each in carried))
         settings: dict[str, Node] = {"base": hexadecimal(kind.base)} if kind.base else {}

@@ -151,8 +151,7 @@ class ClassBuilder:
     @property
     def _divided(self) -> bool:
         """Whether requests and responses have different frames, and their classes different bases."""
-        frames = self._plan.frames
-        return frames["request"] is not frames["response"]
+        return self._plan.directed or self._plan.frame.needs_request
 
     def _shared_shapes(self) -> Mapping[Shape, tuple[str, MessagePlan]]:
         groups: dict[Shape, list[MessagePlan]] = {}

@@ -32,6 +32,8 @@ class DecodedDirection:
     readers_by_id: str
     #: The function that decodes one frame, and what the decoder of a stream uses.
     decode: str = "_decode"
+    #: The table of its kinds of frame, "" if both directions have the same.
+    kinds: str = ""
     ways: Sequence[str] = ()
 
 
@@ -99,6 +101,7 @@ def _decoded_direction(plan: Plan, direction: Direction, ways: Ways) -> DecodedD
         by_id=by_id(messages),
         readers_by_id=by_id(messages, ".from_checked"),
         decode=ways.of("_decode", direction),
+        kinds=f"_KINDS{upper}" if plan.parted else "",
         ways=[ways.of(name, direction) for name in ("_split", "_judge", "_MAX_FRAME", "_whole")],
     )
 

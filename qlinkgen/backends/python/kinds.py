@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import assert_never
 
@@ -124,7 +124,8 @@ class KindsView:
 
     Attributes:
         firsts: the bytes with which frames begin.
-        by_first: the kinds by first byte.
+        found: the kinds that are decoded.
+        by_first: the kinds by first byte, by direction; that is "" if both have the same kinds.
         families: the maximum payload size of each kind, by the base of its messages.
         shift: bits of the numbers of messages in frames.
         measured: the message gives the size of some kinds.
@@ -141,7 +142,8 @@ class KindsView:
     kinds: Sequence[KindView]
     address: AddressNames | None
     firsts: Sequence[str]
-    by_first: Sequence[tuple[str, Sequence[KindView]]]
+    found: Sequence[KindView]
+    by_first: Mapping[str, Sequence[tuple[str, Sequence[KindView]]]]
     families: Sequence[tuple[str, Sequence[tuple[int, KindView, int]]]]
     measured: bool
     makers: frozenset[str]
@@ -155,6 +157,11 @@ class KindsView:
     template = "kinds"
     idle = None
 
+    @property
+    def parted(self) -> bool:
+        """Whether the directions have different kinds."""
+        return "" not in self.by_first
+
 
 AnyView = FrameView | KindsView
 
@@ -162,13 +169,12 @@ AnyView = FrameView | KindsView
 def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
     """The view of the kinds of frame of a protocol; ``make`` names its conversions."""
     views = {frame.name: _kind(frame, plan, make) for frame in plan.frame.kinds}
-    firsts: dict[int, list[KindView]] = {}
     families: dict[int, list[tuple[int, KindView, int]]] = {}
     for frame in sorted(plan.frame.kinds, key=lambda each: each.max_payload):
         families.setdefault(frame.base, []).append((frame.max_payload, views[frame.name], frame.base))
-    for frame in plan.frame.kinds:
-        for first in dict.fromkeys(start[0] for start in frame.envelope.starts):
-            firsts.setdefault(first, []).append(views[frame.name])
+    received = {each: plan.frames[each].kinds for each in plan.received_directions}
+    searched = received if plan.parted else {"": plan.frame.kinds}
+    by_first = {way: _by_first(kinds, views) for way, kinds in searched.items()}
     nodes = plan.protocol.bus.nodes
     name = plan.frame.address
     address = AddressNames(address_attribute(name), address_argument(name), nodes[0] if nodes else 0)
@@ -176,8 +182,14 @@ def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
         title=title,
         kinds=list(views.values()),
         address=address if name else None,
-        firsts=[literal(bytes((first,))) for first in firsts],
-        by_first=[(in_hex(first), kinds) for first, kinds in firsts.items()],
+        firsts=[
+            literal(bytes((first,)))
+            for first in dict.fromkeys(first for rows in by_first.values() for first, _ in rows)
+        ],
+        found=[
+            views[each.name] for each in plan.frame.kinds if any(each in kinds for kinds in searched.values())
+        ],
+        by_first={way: [(in_hex(first), kinds) for first, kinds in rows] for way, rows in by_first.items()},
         families=[(in_hex(base), kinds) for base, kinds in families.items()],
         measured=any(not view.size and view.ended is None for view in views.values()),
         values=[_value(member, make.place) for member in plan.frame.values.values()],
@@ -188,6 +200,17 @@ def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
         check=_selectable(list(views.values())),
         makers=frozenset(check.view.maker for view in views.values() for check in view.checks),
     )
+
+
+def _by_first(
+    kinds: Sequence[FramePlan], views: Mapping[str, KindView]
+) -> Sequence[tuple[int, Sequence[KindView]]]:
+    """Kinds by their first byte."""
+    found: dict[int, list[KindView]] = {}
+    for kind in kinds:
+        for first in dict.fromkeys(start[0] for start in kind.envelope.starts):
+            found.setdefault(first, []).append(views[kind.name])
+    return list(found.items())
 
 
 def _selectable(kinds: Sequence[KindView]) -> CheckView | None:

@@ -82,6 +82,7 @@ def draw(rng: random.Random) -> Kinds:
         shape.bus = families[0].shape.bus
         frames["line"] = {"parts": shape.frame["parts"]}
         families.append(Family(shape, "line", ended=True))
+    _add_one_way(random.Random(repr(more.getstate())), frames, families)
     mixed = list(frames)
     rng.shuffle(mixed)
     return Kinds({name: frames[name] for name in mixed}, families)
@@ -163,6 +164,73 @@ def _add_values(rng: random.Random, frames: Doc, families: list[Family]) -> None
             for kind in own if seeds else ():
                 kind["parts"]["crc"]["over"] = [*kind["parts"]["crc"]["over"], "attribute.crc_extra"]
         each.shape.frame["parts"] = own[0]["parts"]
+
+
+def _add_one_way(rng: random.Random, frames: Doc, families: list[Family]) -> None:
+    """Parts that only the frames of one direction have, of some kinds."""
+    names = ["origin", "outcome", "stamp", "fixed_mark", "early_sum"]
+    named = {each.name for each in families}
+    for each in families:
+        own = [each.name] if each.name else [name for name in frames if name not in named]
+        if rng.random() < 0.65 or set(frames[own[0]]["parts"]) == {"byte"}:
+            continue
+        each.shape.directed = True
+        for _ in range(rng.choice((1, 1, 2))):
+            name = names.pop(rng.randrange(len(names)))
+            way = {"if": {"direction": rng.choice(("request", "response", "not request"))}}
+            place, covered = rng.random() / 2 if each.ended else rng.random(), rng.random() < 0.7
+            kept = _one_way(rng, name, ended=each.ended)
+            for kind in own:
+                parts = frames[kind]["parts"]
+                over = {"over": [next(iter(parts))]} if "algorithm" in kept else {}
+                frames[kind]["parts"] = _with_value(parts, name, kept | over | way, place, covered=covered)
+        each.shape.frame["parts"] = frames[own[0]]["parts"]
+
+
+def _one_way(rng: random.Random, name: str, *, ended: bool) -> Doc:
+    """A constant, a check value over the first part, or a value; the same in every kind."""
+    if name == "fixed_mark":
+        return {"value": "01" if ended else rng.choice(("55", "01 02"))}
+    if name == "early_sum" and not ended:
+        return {"type": "u8", "algorithm": rng.choice(("sum8", "xor8"))}
+    return {"type": "u8", "range": "0..1"} if ended or name == "origin" else {"type": "u8", "default": 3}
+
+
+def turn(rng: random.Random, several: Kinds, found: Doc) -> None:
+    """Let some kinds go one direction alone: those of which all messages do. They may begin alike."""
+    sent = _directions(found)
+    ways: dict[str, str] = {}
+    for each in several.families:
+        way = sent.get(each.name, set())
+        alone = each.name and not each.shape.directed and len(way) == 1 and way <= {"request", "response"}
+        if alone and rng.random() < 0.6:
+            ways[each.name] = next(iter(way))
+            several.frames[each.name]["if"] = {"direction": ways[each.name]}
+    asks = [name for name, way in ways.items() if way == "request"]
+    tells = [name for name, way in ways.items() if way == "response"]
+    if asks and tells and rng.random() < 0.7:
+        parts = several.frames[tells[0]]["parts"]
+        lead = next(iter(several.frames[asks[0]]["parts"].values()))
+        if isinstance(lead, str) and isinstance(parts[next(iter(parts))], str):
+            parts[next(iter(parts))] = lead if rng.random() < 0.6 or "byte" in parts else f"{lead} 5A"
+
+
+def _directions(found: Doc) -> dict[str, set[str]]:
+    """The directions of the messages of each kind; "both" if one has none."""
+    sent: list[tuple[str, str]] = []
+    for spec in found["commands"].values():
+        kind, response = spec.get("frame", ""), spec["response"]
+        answer = response.get("frame", kind) if isinstance(response, dict) else kind
+        sent += [(kind, "request"), (answer, "response")]
+        for step in spec.get("steps", ()):
+            sent += [
+                (step[key]["frame"], way)
+                for key, way in (("send", "request"), ("receive", "response"))
+                if isinstance(step.get(key), dict)
+            ]
+    sent += [(each.get("frame", ""), each.get("direction", "both")) for each in found["messages"].values()]
+    sent += [(each.get("frame", ""), "response") for each in found.get("replies", {}).values()]
+    return {name: {way for other, way in sent if other == name} for name, _ in sent}
 
 
 def _with_value(parts: Doc, name: str, spec: Doc, place: float, *, covered: bool) -> Doc:

@@ -129,6 +129,7 @@ class _Maker:
                 found["messages"][self.words.name(taken)] = message | family.spec
         self._answered_otherwise(several, maker, found)
         _refuse_shortly(random.Random(repr(self.rng.getstate())), several, found)
+        kinds.turn(random.Random(f"turn {self.rng.getstate()!r}"), several, found)
         self._seeds(
             next((each.shape for each in several.families if each.shape.seeds), several.families[0].shape),
             found,

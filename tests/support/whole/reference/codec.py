@@ -60,11 +60,13 @@ class Reference:
         names = [name for each in kinds.documents.values() if (name := address_of(each))]
         self.address_name = names[0] if names else None
         self.messages = tuple(kinds.messages())
-        for name, frame in kinds.frames.items():
-            carried = [each for each in self.messages if name in each.frames]
-            frame.seeds = {each.number: document.seeds(data, each.name) for each in carried}
+        for direction, way in kinds.ways.items():
+            for name, frame in way.items():
+                carried = [each for each in self.messages if name in each.frames]
+                carried = [each for each in carried if each.direction in (direction, "message")]
+                frame.seeds = {each.number: document.seeds(data, each.name) for each in carried}
         self.messages = tuple(
-            replace(each, beside=kinds.frames[each.frames[0]].beside) for each in self.messages
+            replace(each, beside=kinds.way(each)[each.frames[0]].beside) for each in self.messages
         )
 
     def _read(self, data: Doc) -> None:
@@ -173,7 +175,7 @@ class Reference:
             payload = frame.opened(message, wire, request)
             return Seen(message.name, None, values.decode(message, payload))
         if isinstance(frame, Kinds):
-            event = frame.searcher(known).whole(wire)
+            event = frame.searcher(known, direction).whole(wire)
         elif isinstance(frame, Frame):
             event = Searcher(frame, known).whole(wire)
         else:
@@ -204,7 +206,7 @@ class Reference:
         """A new receiver; `asked` are the requests that are answered."""
         known, frame = self.known(direction), self.frame_of(direction)
         if isinstance(frame, Kinds):
-            return frame.searcher(known)
+            return frame.searcher(known, direction)
         if isinstance(frame, Marked):
             return MarkedReceiver(frame, known)
         if isinstance(frame, Packets):

@@ -143,8 +143,8 @@ def _cases(check: Part, data: bytes) -> tuple[bytes, ...]:
     return (data.upper(),) if "as" in check.spec else (data,)
 
 
-def _has(spec: object, direction: str) -> bool:
-    """Whether the frames of a direction have a part."""
+def has(spec: object, direction: str) -> bool:
+    """Whether the frames of a direction have a part, or a kind."""
     wanted = _directed(spec)
     if not wanted:
         return True
@@ -200,7 +200,7 @@ class Frame:
         """Read the parts of the frames of a direction; "" if both have the same."""
         frame, order = document["frame"], document.get("byteorder", "big")
         fields = Fields(document, 0)
-        specs = {name: spec for name, spec in frame["parts"].items() if _has(spec, direction)}
+        specs = {name: spec for name, spec in frame["parts"].items() if has(spec, direction)}
         #: Some parts are only in the frames of one direction.
         self.one_way = any(map(_directed, frame["parts"].values())) or has_parties(document)
         specs = {name: told(spec, direction, document) for name, spec in specs.items()}

@@ -8,7 +8,7 @@ from typing import Any
 
 from tests.support.whole.reference import document
 from tests.support.whole.reference.fields import Fields, bits_of
-from tests.support.whole.reference.frames import Frame, NeedMore, Refused
+from tests.support.whole.reference.frames import Frame, NeedMore, Refused, has
 from tests.support.whole.reference.layouts import Message
 from tests.support.whole.reference.notation import Direction, Doc, part_doc
 from tests.support.whole.reference.receivers import Event, Receiver, Searcher
@@ -22,16 +22,32 @@ class Kinds:
         """Read each kind as a frame of its own."""
         self._data = data
         self.documents = {name: {**data, "frame": _whole(spec)} for name, spec in data["frames"].items()}
-        self.frames = {name: Frame(each, "response") for name, each in self.documents.items()}
+        #: The frames of each direction by the name of their kind.
+        self.ways: dict[str, dict[str, Frame]] = {
+            way: {
+                name: Frame(each, way)
+                for name, each in self.documents.items()
+                if has(data["frames"][name], way)
+            }
+            for way in ("request", "response")
+        }
+        self.frames = {
+            name: {**self.ways["request"], **self.ways["response"]}[name] for name in data["frames"]
+        }
         named = {name for name in _values_of(data, "frame") if isinstance(name, str)}
         self.shared = tuple(name for name in self.frames if name not in named)
         #: The largest payload of any kind.
         self.most = max(frame.most for frame in self.frames.values())
-        for name, frame in self.frames.items():
-            if not frame.starts:
-                carried = {each.number for each in self._messages() if name in each.frames}
-                frame.starts = tuple(put(frame.parts[0].pieces, number) for number in carried)
-                frame.bare = False
+        for way, frames in self.ways.items():
+            for name, frame in frames.items():
+                if not frame.starts:
+                    ways = (
+                        (way,) if frame.one_way or "if" in data["frames"][name] else (*self.ways, "message")
+                    )
+                    sent = [each for each in self._messages() if each.direction in ways]
+                    carried = {each.number for each in sent if name in each.frames}
+                    frame.starts = tuple(put(frame.parts[0].pieces, number) for number in carried)
+                    frame.bare = False
 
     def messages(self) -> Iterator[Message]:
         """All messages, in order."""
@@ -91,16 +107,21 @@ class Kinds:
 
     def kind_of(self, message: Message, size: int) -> Frame:
         """The kind for a payload of a size: the smallest that holds it, else the largest."""
-        frames = sorted((self.frames[each] for each in message.frames), key=lambda each: each.most)
+        way = self.way(message)
+        frames = sorted((way[each] for each in message.frames), key=lambda each: each.most)
         return next((each for each in frames if each.least <= size <= each.most), frames[-1])
 
     def wrap(self, message: Message, payload: bytes, address: int, given: Mapping[str, Raw]) -> bytes:
         """A frame around a payload, which is not checked."""
         return self.kind_of(message, len(payload)).wrap(message.number, payload, address, given)
 
-    def searcher(self, known: Mapping[int, Message]) -> KindSearcher:
+    def way(self, message: Message) -> dict[str, Frame]:
+        """The frames of the direction of a message, by the name of their kind."""
+        return self.ways["response" if message.direction == "response" else "request"]
+
+    def searcher(self, known: Mapping[int, Message], direction: str) -> KindSearcher:
         """A receiver of these messages."""
-        return KindSearcher(self, known)
+        return KindSearcher(self.ways["response" if direction == "response" else "request"], known)
 
 
 def address_of(data: Doc) -> str | None:
@@ -143,12 +164,12 @@ def _values_of(node: Any, key: str) -> Iterator[Any]:
 class KindSearcher(Receiver):
     """Tries each kind where a frame may begin; otherwise the search continues at the next byte."""
 
-    def __init__(self, kinds: Kinds, known: Mapping[int, Message]) -> None:
-        """An empty buffer."""
+    def __init__(self, frames: Mapping[str, Frame], known: Mapping[int, Message]) -> None:
+        """An empty buffer; ``frames`` are those of a direction."""
         super().__init__(known)
         self.searchers = [
             Searcher(frame, {each.number: each for each in known.values() if name in each.frames})
-            for name, frame in kinds.frames.items()
+            for name, frame in frames.items()
         ]
         self.buffer, self.start, self.ended = b"", 0, False
 
