@@ -21,6 +21,7 @@ from qlinkgen.plan.describe import (
     part_text,
     span_text,
     transparency_text,
+    unread_text,
     value_text,
 )
 from qlinkgen.plan.ends import ByLength, ByMark
@@ -109,7 +110,7 @@ def finding(found: Dissection, fault: Fault, start: int = 0) -> Words:  # noqa: 
             cause = "the device does not know the command, or does not accept it now"
             return f"{of.name} is {fault.seen}: the command was refused as illegal", cause
         case Rule.VALUE:
-            return _value(fault)
+            return _value(found, fault)
         case _:
             assert_never(fault.rule)
 
@@ -283,7 +284,7 @@ def _coverages(found: Dissection, plain: Mapping[str, bytes], over: Sequence[str
             assert_never(way)
 
 
-def _value(fault: Fault) -> Words:
+def _value(found: Dissection, fault: Fault) -> Words:
     assert isinstance(fault.of, Step | Member)
     scalar = number_of(fault.of)
     seen = fault.seen or 0
@@ -296,11 +297,14 @@ def _value(fault: Fault) -> Words:
             f"{fault.inside}{fault.of.name} has an invalid byte 0x{seen:02X}",
             "bytes were corrupted on the wire",
         )
+    same = (each for each in found.spans if (each.of, each.inside) == (fault.of, fault.inside))
+    unread = next((text for each in same if (text := unread_text(fault.of, each.raw))), "")
     if isinstance(fault.of, ConstantStep):
         always = constant_text(fault.of)
         cause = "another message or revision of the protocol"
-        return f"{fault.inside}{fault.of.name} is {seen}, but is always {always}", cause
-    rule = f"{fault.inside}{fault.of.name} is {value_text(scalar, seen)}, allowed are {limits_text(scalar)}"
+        return f"{fault.inside}{fault.of.name} is {unread or seen}, but is always {always}", cause
+    shown = unread or value_text(scalar, seen)
+    rule = f"{fault.inside}{fault.of.name} is {shown}, allowed are {limits_text(scalar)}"
     return rule, "the sender does not observe the range"
 
 

@@ -149,11 +149,11 @@ def _about(step: Step | Member, value: Value | None) -> list[str]:
 
 def show_enum(enum: Enum) -> None:
     """Print the names of an enum."""
-    table = Table(
-        ["number", "name", "meaning"], f"{enum.name}: {enum.doc}".rstrip(": "), frozenset({"number"})
-    )
+    column = "word" if enum.words else "number"
+    table = Table([column, "name", "meaning"], f"{enum.name}: {enum.doc}".rstrip(": "), frozenset({"number"}))
     for member in enum.members:
-        table.add(member.value, member.name, member.doc)
+        sent = enum.words.text(member.value).decode() if enum.words else member.value
+        table.add(sent, member.name, member.doc)
     table.show()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import assert_never
 
 from qlinkgen.plan.content import unpack_items
-from qlinkgen.plan.describe import filled_number, id_text, part_text, value_text
+from qlinkgen.plan.describe import filled_number, id_text, part_text, unread_text, value_text
 from qlinkgen.plan.parts import (
     AddressPart,
     BlocksPart,
@@ -90,7 +90,7 @@ def _of_field(field: Step | Member, span: Span) -> str:
     number, raw = span.number or 0, span.raw.ljust(span.size, b"\0")
     match field:
         case ConstantStep() | ReservedStep() | ValueStep() | Member():
-            return value_text(field.number, number)
+            return (span.fault and unread_text(field, span.raw)) or value_text(field.number, number)
         case CountStep():
             return str(number)
         case FilledStep():

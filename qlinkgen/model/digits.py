@@ -72,6 +72,11 @@ class Digits:
         return -number if text.startswith(b"-") else number
 
     @property
+    def wrong(self) -> bytes:
+        """A text of the greatest size that is not a number."""
+        return b"G" * self.most
+
+    @property
     def name(self) -> str:
         """The form as written in a schema, without the number of characters."""
         return "decimal" if self.base == 10 else "hex"

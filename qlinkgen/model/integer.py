@@ -8,10 +8,13 @@ from functools import cached_property
 from typing import Literal
 
 from qlinkgen.model.digits import Digits
+from qlinkgen.model.words import Words
 
 ByteOrder = Literal["big", "little"]
 #: Order of numbers of a few bits in a row of bits: the first one is in the least, or most, significant bits.
 BitOrder = Literal["least", "most"]
+#: How a number is written as text.
+TextForm = Digits | Words
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +95,8 @@ class Integer:
     chunks: tuple[Chunk, ...]
     #: Binary-coded decimal: each four bits are a digit.
     bcd: bool = False
-    #: Its digits, if it is sent as text; it has no chunks then.
-    text: Digits | None = None
+    #: Its digits, or the words for it, if it is sent as text; it has no chunks then.
+    text: TextForm | None = None
 
     @property
     def size(self) -> int:
@@ -101,9 +104,12 @@ class Integer:
         return self.text.most if self.text else len(self.chunks)
 
     @property
-    def form(self) -> str:
-        """How its digits are written, for descriptions; "" if it is binary."""
-        return f" {self.text}" if self.text else " bcd" if self.bcd else ""
+    def notation(self) -> str:
+        """Its type and how its digits are written, for descriptions; the size of words."""
+        if isinstance(self.text, Words):
+            return str(self.text)
+        form = f" {self.text}" if self.text else " bcd" if self.bcd else ""
+        return f"{'i' if self.signed else 'u'}{self.bits}{form}"
 
     @property
     def minimum(self) -> int:
@@ -158,7 +164,7 @@ class Integer:
         """Whether unused bits are set or digits are wrong, so that the bytes are invalid."""
         if self.text:
             number = self.text.number(data)
-            signed = data[:1] in (b"+", b"-") and self.minimum >= 0
+            signed = isinstance(self.text, Digits) and data[:1] in (b"+", b"-") and self.minimum >= 0
             return number is None or signed or not self.minimum <= number <= self.maximum
         if self.bcd:
             return not data.hex().isdecimal()

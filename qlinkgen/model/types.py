@@ -15,10 +15,19 @@ from functools import cached_property
 from typing import ClassVar, Literal
 
 from qlinkgen.model.checksum import Checksum
-from qlinkgen.model.digits import Digits
 from qlinkgen.model.floats import Float
-from qlinkgen.model.integer import BitOrder, ByteOrder, Chunk, Integer, byte_chunks, group_chunks, packed_size
+from qlinkgen.model.integer import (
+    BitOrder,
+    ByteOrder,
+    Chunk,
+    Integer,
+    TextForm,
+    byte_chunks,
+    group_chunks,
+    packed_size,
+)
 from qlinkgen.model.texts import Text
+from qlinkgen.model.words import Words
 
 __all__ = [
     "DOUBLE_BITS",
@@ -69,7 +78,7 @@ class NamedValue:
 
 @dataclass(frozen=True, slots=True)
 class Enum:
-    """Named numbers. A number without a name is legal."""
+    """Named numbers, or named words. A number without a name is legal."""
 
     kind: ClassVar = "enum"
     name: str
@@ -77,6 +86,8 @@ class Enum:
     members: tuple[NamedValue, ...]
     doc: Text = ""
     section: Text = ""
+    #: What is sent in place of the numbers, which are those from 0 then.
+    words: Words | None = None
 
     def name_of(self, value: int) -> str | None:
         """The name of a number, or None."""
@@ -234,8 +245,8 @@ class Scalar:
     chunks: tuple[Chunk, ...]
     #: Binary-coded decimal.
     bcd: bool = False
-    #: Its digits, if it is sent as text.
-    text: Digits | None = None
+    #: Its digits, or the words for it, if it is sent as text.
+    text: TextForm | None = None
     minimum: int
     maximum: int
     default: int = 0

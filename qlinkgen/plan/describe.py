@@ -26,6 +26,7 @@ from qlinkgen.model.types import (
     Settable,
 )
 from qlinkgen.model.values import native_from_raw
+from qlinkgen.model.words import Words
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
 from qlinkgen.plan.ends import (
@@ -104,7 +105,9 @@ def number_text(value: Number | Fraction) -> str:
 
 
 def limits_text(scalar: Scalar) -> str:
-    """Legal values in the unit."""
+    """Legal values in the unit, or all words."""
+    if isinstance(scalar.text, Words):
+        return ", ".join(each.decode() for each in scalar.text.words)
     low, high = scalar.span
     return f"{number_text(low)}..{number_text(high)}"
 
@@ -113,14 +116,20 @@ def range_text(scalar: Scalar) -> str:
     """Legal values in the unit; "" for a bool, enum or flags without limits."""
     match scalar.role:
         case Constant():
-            others = "".join(f" or {number_text(scalar.physical(each))}" for each in scalar.role.accepted)
-            return f"always {number_text(scalar.physical(scalar.default))}{others}"
+            return f"always {_constants_text(scalar, (scalar.default, *scalar.role.accepted))}"
         case Reserved():
             return "reserved"
         case Settable() | Count() | Checked() | Derived():
             return "" if _is_free(scalar) else limits_text(scalar)
         case _:
             assert_never(scalar.role)
+
+
+def _constants_text(scalar: Scalar, raw: Sequence[int]) -> str:
+    """The legal values of a constant."""
+    if isinstance(scalar.text, Words):
+        return " or ".join(scalar.text.text(each).decode() for each in raw)
+    return " or ".join(number_text(scalar.physical(each)) for each in raw)
 
 
 def _is_free(scalar: Scalar) -> bool:
@@ -145,6 +154,8 @@ def value_text(scalar: Scalar, raw: int) -> str:
     """A value: its number in the unit, its name, or the names of its bits."""
     meaning = scalar.meaning
     match meaning:
+        case Enum(words=Words() as words):
+            return f"{meaning.name_of(raw)} ({words.text(raw).decode()})"
         case Enum():
             return f"{meaning.name_of(raw) or 'no name'} ({raw})"
         case Flags():
@@ -161,6 +172,14 @@ def value_text(scalar: Scalar, raw: int) -> str:
             return f"{number_text(scalar.physical(raw))}{unit}{raw_text}"
         case _:
             assert_never(meaning)
+
+
+def unread_text(field: Step | Member, raw: bytes) -> str:
+    """Text that is neither a number nor a word of its field; "" for coded and for other bytes."""
+    integer = field.integer if isinstance(field, ValueStep | ConstantStep | ReservedStep) else None
+    if integer is None or integer.text is None or len(raw) > integer.size or not integer.stray(raw):
+        return ""
+    return repr(raw.decode("ascii", "backslashreplace"))
 
 
 # Steps ------------------------------------------------------------------------------------------------------
@@ -220,7 +239,7 @@ def _scalar_text(scalar: Scalar) -> str:
 
 def integer_text(integer: Integer) -> str:
     """``u8``, ``i32 little``, ``u14 in groups: bits 7-13 0-6``."""
-    base = f"{'i' if integer.signed else 'u'}{integer.bits}{integer.form}"
+    base = integer.notation
     if integer.size <= 1 or integer.text:
         return base
     if integer.byteorder:
@@ -307,7 +326,8 @@ def must_text(step: Step | Member) -> str:
 
 def constant_text(step: ConstantStep) -> str:
     """The numbers that a receiver accepts, the one that is sent first."""
-    return " or ".join(map(str, (step.value, *step.accepted)))
+    raw = (step.value, *step.accepted)
+    return _constants_text(step.number, raw) if step.integer.text else " or ".join(map(str, raw))
 
 
 def filled_text(step: FilledStep) -> str:

@@ -260,6 +260,9 @@ def _bit_meaning(
         if width > 1:
             location.fault("bits-do-not-fit", "", f"bool has one bit, not {width}", "use at: with one bit")
         return "bool"
+    if isinstance(plain.meaning, Enum) and plain.meaning.words is not None:
+        location.fault("not-applicable", "type", f"{spec.type} is sent as text", "use an enum of numbers")
+        return "unknown"
     if isinstance(plain.meaning, Enum) and any(member.value < 0 for member in plain.meaning.members):
         what = f"{spec.type} has negative values, which a bit field cannot hold"
         location.fault("bits-do-not-fit", "", what, "use signed: true without a type, or numbers from 0")

@@ -6,13 +6,20 @@ import re
 from collections.abc import Mapping
 
 from qlinkgen.model.types import Enum, Flags, NamedValue
+from qlinkgen.model.words import Words
 from qlinkgen.schema.file_fields import EnumSpec, FlagsSpec
+from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.synonyms import type_hint
 
 #: Maximum width of an integer with a meaning, a scale, bits or groups, and of an item of an array.
 MAX_BITS = 64
+#: Maximum number of characters of a number or a word.
+MAX_CHARACTERS = 40
+#: Bits of the numbers of words, one of which is left for all other texts.
+_WORD_BITS = 8
+_MAX_WORDS = 255
 #: Maximum width of a plain integer.
 MAX_WIDE_BITS = 128
 INTEGER = re.compile(r"(?P<sign>[ui])(?P<bits>[1-9][0-9]{0,2})\Z", re.ASCII)
@@ -34,12 +41,52 @@ def carrier(text: str) -> tuple[int, bool] | None:
 def build_enum(name: str, spec: EnumSpec, report: Reporter) -> Enum:
     """The enum described by a mapping."""
     path: Path = ("enums", name)
+    if spec.type == "text":
+        return _worded(name, spec, path, report)
     bits, signed = _carrier(spec.type, path, report, signed=True)
-    members = {key: value.value for key, value in spec.values.items()}
+    members = {}
+    for key, value in spec.values.items():
+        if isinstance(value.value, int):
+            members[key] = value.value
+        else:
+            what = f"{shown(value.value)} is not a whole number"
+            report.error(
+                "wrong-type",
+                (*path, "values", key),
+                what,
+                "write one, or type: text",
+                needs=((*path, "type"),),
+            )
+            report.taint(path)
     limits = integer_range(bits, signed=signed)
     _check_members(members, limits, f"does not fit {spec.type}", path, report)
-    constants = tuple(NamedValue(key, value.value, value.doc) for key, value in spec.values.items())
+    constants = tuple(NamedValue(key, number, spec.values[key].doc) for key, number in members.items())
     return Enum(name, bits, constants, spec.doc, spec.section)
+
+
+def _worded(name: str, spec: EnumSpec, path: Path, report: Reporter) -> Enum:
+    """An enum of words; their places are its numbers."""
+    words: dict[str, str] = {}
+    for key, value in spec.values.items():
+        word, place = value.value, (*path, "values", key)
+        if not isinstance(word, str):
+            report.error("wrong-type", place, f"{word} is not a text", f'quote it: "{word}"', needs=(place,))
+            report.taint(path)
+        elif not (word.isascii() and word.isprintable() and 0 < len(word) <= MAX_CHARACTERS):
+            what = f"{shown(word)} is not a word of 1 to {MAX_CHARACTERS} printable ASCII characters"
+            report.error("value-does-not-fit", place, what, "use other characters", needs=(place,))
+            report.taint(path)
+        elif other := next((other for other, known in words.items() if known == word), None):
+            what = f"{key} and {other} are both {shown(word)}"
+            report.error("duplicate-value", place, what, "give each a different word", needs=(place,))
+        else:
+            words[key] = word
+    if len(spec.values) > _MAX_WORDS:
+        what = f"{name} has {len(spec.values)} words"
+        report.error("value-does-not-fit", (*path, "values"), what, f"use at most {_MAX_WORDS}", needs=())
+    members = tuple(NamedValue(key, at, spec.values[key].doc) for at, key in enumerate(words))
+    found = Words(name, tuple(each.encode() for each in words.values()) or (b"?",))
+    return Enum(name, _WORD_BITS, members, spec.doc, spec.section, found)
 
 
 def build_flags(name: str, spec: FlagsSpec, report: Reporter) -> Flags:

@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from qlinkgen.model.condition import exclusive
+from qlinkgen.model.digits import Digits
 from qlinkgen.model.fields import Field, FieldType, Record, Records, greatest_size
 from qlinkgen.model.types import Array, Blob, Count, Scalar
 from qlinkgen.schema.conditions import ConditionBuilder
@@ -72,8 +73,11 @@ class FieldBuilder:
         """Check that a receiver finds the end of a number as text."""
         number = kind.item if isinstance(kind, Array) else kind
         if isinstance(number, Scalar) and number.text and not number.text.fixed:
-            what = f"the text of {path[-1]} has {number.text.least} to {number.text.most} characters"
-            hint = f"use a constant number, as: {number.text.name}[{number.text.most}], or a separator"
+            text = number.text
+            what = f"the text of {path[-1]} has {text.least} to {text.most} characters"
+            hint = "use words of one length, or a separator"
+            if isinstance(text, Digits):
+                hint = f"use a constant number, as: {text.name}[{text.most}], or a separator"
             self._report.error("bad-digits", path, what, hint, of_key=True)
 
     def _kind(self, spec: FieldSpec, path: Path) -> FieldType | None:

@@ -24,6 +24,7 @@ from qlinkgen.schema.kinds import (
     AnyRange,
     ByteText,
     Id,
+    NumberOrWord,
     Order,
     Rational,
     ScalarValue,
@@ -42,18 +43,18 @@ class GroupSpec(FileMapping):
 
 
 class EnumValueSpec(Lifetime):
-    """A named number."""
+    """A named number, or a named word."""
 
-    value: StrictInt = Field(description="The number")
+    value: NumberOrWord = Field(description="The number; of an enum of texts, the word")
     doc: Text = Field(default="", description="Description, in one sentence")
 
 
 class EnumSpec(Fact):
-    """Named numbers of one integer type."""
+    """Named numbers of one integer type, or named words."""
 
-    type: str = Field(description="Its integer type")
-    values: dict[str, Annotated[EnumValueSpec, ShortForm("value", "integer")]] = Field(
-        min_length=1, description="Name: number"
+    type: str = Field(description="Its integer type, or text for words")
+    values: dict[str, Annotated[EnumValueSpec, ShortForm("value", "integer", "string")]] = Field(
+        min_length=1, description="Name: number, or name: word"
     )
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from qlinkgen.model.digits import Digits
 from qlinkgen.model.types import Float, Scalar
-from qlinkgen.schema.constants import MAX_BITS
+from qlinkgen.schema.constants import MAX_BITS, MAX_CHARACTERS
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import did_you_mean
 
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from qlinkgen.schema.file_fields import FieldSpec
     from qlinkgen.schema.location import Location
 
-#: Maximum number of characters.
-_MOST = 40
 _TEXT = re.compile(
     r"(?P<name>decimal|hex)(?:\[\s*(?P<least>[0-9]{1,3})\s*(?:\.\.\s*(?P<most>[0-9]{1,3})\s*)?\])?\Z",
     re.ASCII,
@@ -87,7 +85,7 @@ def _point(scalar: Scalar, spec: FieldSpec, location: Location) -> int | None:
 
 def _digits(scalar: Scalar, match: re.Match[str], point: int, location: Location) -> Digits | None:
     base = 10 if match["name"] == "decimal" else 16
-    whole = Digits(base, 1, _MOST, point)  # type: ignore[arg-type]
+    whole = Digits(base, 1, MAX_CHARACTERS, point)  # type: ignore[arg-type]
     widest = max(
         len(whole.text(each))
         for each in (scalar.natural_minimum, scalar.natural_maximum)
@@ -98,11 +96,11 @@ def _digits(scalar: Scalar, match: re.Match[str], point: int, location: Location
     least = int(match["least"])
     most = int(match["most"] or least)
     needed = point + 2 if point else 1
-    if not needed <= most <= _MOST or not 1 <= least <= most:
+    if not needed <= most <= MAX_CHARACTERS or not 1 <= least <= most:
         what = (
             f"{match[0]} has no room for a number" if most < needed else f"{match[0]} ends before it begins"
         )
-        hint = f"use {needed} to {_MOST} characters, the decimal point included"
+        hint = f"use {needed} to {MAX_CHARACTERS} characters, the decimal point included"
         location.fault("bad-digits", "as", what, hint)
         return None
     return Digits(base, least, most, point)  # type: ignore[arg-type]

@@ -64,6 +64,14 @@ def _values(value: object) -> object:
     return value
 
 
+def _number_or_word(value: object) -> object:
+    if isinstance(value, bool) or not isinstance(value, int | str):
+        raise ValueError(  # noqa: TRY004 - a wrong value of the file, not of a caller
+            f"{shown(value)} is neither a whole number nor a word; quote a word"
+        )
+    return value
+
+
 def _label(value: object) -> object:
     if not isinstance(value, int | str):
         raise ValueError(  # noqa: TRY004 - a wrong value of the file, not of a caller
@@ -187,6 +195,12 @@ Label = Annotated[int | bool | str, PlainValidator(_label), _json("A label", "st
 #: A value that is an integer, or named by an enum.
 NumberOrName = Annotated[
     int | bool | str, PlainValidator(_label), _json("A number, or a name of its enum", "string", "integer")
+]
+#: What is sent for a name of an enum.
+NumberOrWord = Annotated[
+    int | str,
+    PlainValidator(_number_or_word),
+    _json("A number, or a word of an enum of texts", "integer", "string"),
 ]
 Name = Annotated[str, WithJsonSchema({"type": "string", "pattern": NAME_PATTERN})]
 Count = Annotated[StrictInt, Field(ge=1)]

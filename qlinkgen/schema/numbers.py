@@ -181,8 +181,8 @@ def _float_default(
 
 def _raw(scalar: Scalar, value: Written, key: str, location: Location) -> int | None:
     """The raw integer of a default or constant."""
-    if isinstance(scalar.meaning, Enum) and isinstance(value, str):
-        return _named(scalar.meaning, value, key, location)
+    if isinstance(scalar.meaning, Enum) and (isinstance(value, str) or scalar.meaning.words is not None):
+        return _named(scalar.meaning, str(value), key, location)
     if scalar.meaning == "bool" and isinstance(value, bool):
         return int(value)
     if isinstance(value, bool) or not isinstance(value, int | Decimal):

@@ -63,7 +63,9 @@ class PieceBuilder:
                 found = [(each.name, each.shift, each.type, each.doc) for each in kind.members]
                 bits = tuple(self._number(*each, path) for each in found)
                 return kind.container, bits
-            case Scalar() if kind.settable and kind.meaning != "bool" and not isinstance(kind.meaning, Float):
+            case Scalar() if (
+                kind.settable and kind.text is None and not isinstance(kind.meaning, Float | str)
+            ):
                 number = self._number(name, 0, kind, spec.doc, path)
                 return _container(kind), (self._counted(number, spec, path),)
             case Blob() if (text := text_of(kind)) is not None:

@@ -37,6 +37,10 @@ FIXED = re.compile(r"(?P<sign>u?)fixed(?P<whole>[0-9]{1,2})\.(?P<fraction>[0-9]{
 FLOAT = re.compile(r"f(?P<bits>16|32|64)\Z", re.ASCII)
 #: Keys of numbers that neither check values nor derived ones have.
 _NUMBER_KEYS = ("scale", "offset", "unit", "range", "raw_range", "default", "const", "reserved", "as", "echo")
+#: Keys of the bytes of a number.
+_LAYOUT_KEYS = ("byteorder", "groups", "parts", "packed", "as")
+#: Keys of the steps of a number.
+_QUANTITY_KEYS = ("scale", "offset", "unit", "range", "raw_range")
 #: Built-in types other than integers.
 KEYWORDS = ("bool", "bytes", "text")
 
@@ -148,6 +152,8 @@ class ScalarBuilder:
 
     def build(self, spec: FieldSpec, base: str, plain: Plain, location: Location) -> Scalar | None:
         """The scalar of a field; None if its layout is unknown."""
+        if isinstance(plain.meaning, Enum) and plain.meaning.words is not None:
+            return self._worded(spec, plain, plain.meaning, location)
         if spec.packed and plain.meaning == "bool":
             plain = replace(plain, bits=1)
         chunks = self._chunks(spec, plain.bits, base, location)
@@ -171,14 +177,21 @@ class ScalarBuilder:
             return replace(scalar, role=_count(spec, location))
         if is_filled(spec):
             return _placed(scalar, spec, plain, location)
-        scalar = quantified(scalar, spec, plain.what, location)
-        if isinstance(spec.const, list):
-            return _constants(scalar, spec.const, location)
-        key = "const" if spec.const is not None else "default"
-        scalar = defaulted(scalar, getattr(spec, key), key, location)
-        if spec.reserved:
-            return replace(scalar, role=Reserved())
-        return scalar if spec.const is None else replace(scalar, role=Constant())
+        return _valued(quantified(scalar, spec, plain.what, location), spec, location)
+
+    def _worded(self, spec: FieldSpec, plain: Plain, enum: Enum, location: Location) -> Scalar | None:
+        """A word of an enum."""
+        location.reject(spec, (*_LAYOUT_KEYS, *_QUANTITY_KEYS, "counts", "algorithm", "equals"), plain.what)
+        if self._file.groups is not None:
+            what = f"words are not sent in groups of {self._file.groups.bits} bits"
+            location.fault("bad-width", "type", what, "use an enum of numbers")
+        words = enum.words
+        assert words is not None
+        _check_keys(spec, plain, location)
+        scalar = Scalar(
+            bits=enum.bits, chunks=(), text=words, minimum=words.lowest, maximum=words.highest, meaning=enum
+        )
+        return _valued(scalar, spec, location)
 
     def _in_a_row(
         self, spec: FieldSpec, bits: int, base: str, location: Location
@@ -229,6 +242,17 @@ class ScalarBuilder:
                 "not-applicable", "parts", "'parts' has no effect without groups", "add groups, or remove it"
             )
         return byte_chunks(bits // 8, spec.byteorder or self._file.byteorder)
+
+
+def _valued(scalar: Scalar, spec: FieldSpec, location: Location) -> Scalar:
+    """A scalar with the default or constant of a field."""
+    if isinstance(spec.const, list):
+        return _constants(scalar, spec.const, location)
+    key = "const" if spec.const is not None else "default"
+    scalar = defaulted(scalar, getattr(spec, key), key, location)
+    if spec.reserved:
+        return replace(scalar, role=Reserved())
+    return scalar if spec.const is None else replace(scalar, role=Constant())
 
 
 def _placed(scalar: Scalar, spec: FieldSpec, plain: Plain, location: Location) -> Scalar:

@@ -9,6 +9,7 @@ from qlinkgen.model.fields import Field
 from qlinkgen.model.frame import DelimitedFrame, Frame
 from qlinkgen.model.message import Message
 from qlinkgen.model.types import Blob, Scalar
+from qlinkgen.model.words import Words
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
@@ -79,8 +80,12 @@ def _checked(field: Field, separator: bytes, excluded: bytes, path: Path, report
         return replace(field, type=replace(kind, excluded=excluded))
     elif not isinstance(kind, Scalar) or kind.text is None:
         what = f"{field.name} is not a text, so it may contain the separator"
-        hint = "use text, or a number with as: decimal or as: hex"
+        hint = "use text, an enum of words, or a number with as: decimal or as: hex"
         report.error(_RULE, path, what, hint, of_key=True)
+    elif isinstance(kind.text, Words) and (inside := kind.text.alphabet & {*excluded}):
+        found = shown(chr(min(inside)))
+        what = f"a word of {kind.text.enum} contains {found}, which divides fields or ends the frame"
+        report.error(_RULE, path, what, "use another separator or terminator", of_key=True)
     elif separator[0] in kind.text.alphabet:
         what = f"the separator {shown(separator.decode())} may occur in the number {field.name}"
         report.error(_RULE, path, what, "use another separator", of_key=True)

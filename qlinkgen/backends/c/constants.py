@@ -74,11 +74,18 @@ def _view(each: Enum | Flags, names: Names) -> EnumView:
                 name=member.name,
                 constant=f"{names.upper}_{names.constants(each).upper()}_{member.name.upper()}",
                 value=_number(member, each, signed=signed),
-                doc=c_text.comment_line(member.doc),
+                doc=c_text.comment_line(_note(member, each)),
             )
             for member in each.members
         ],
     )
+
+
+def _note(member: NamedValue, each: Enum | Flags) -> str:
+    """Its description, and the word that is sent."""
+    words = each.words if isinstance(each, Enum) else None
+    sent = f"sent as {words.text(member.value).decode()}" if words else ""
+    return "; ".join(filter(None, (member.doc, sent)))
 
 
 def constant_type(each: Enum | Flags) -> str:

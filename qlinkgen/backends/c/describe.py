@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import assert_never
 
 from qlinkgen.backends import c_text
+from qlinkgen.model.digits import Digits
 from qlinkgen.model.fields import Layout, Value
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Message
@@ -77,7 +78,7 @@ def _wire_type(step: Step) -> str:
             return f"{'text' if step.text else 'bytes'}[{_length(step.length)}]{pad}{end}"
         case ItemsStep():
             order = f" in a row, {step.packed} first" if step.packed else _order(step.item)
-            return f"{_integer(step.item)}[{_length(step.length)}]{order}"
+            return f"{step.item.notation}[{_length(step.length)}]{order}"
         case RecordStep():
             return step.record.name
         case RecordsStep():
@@ -94,15 +95,11 @@ def _wire_type(step: Step) -> str:
             role = " derived" if isinstance(step.rule, Equal) else " check"
         case _:
             assert_never(step)
-    return f"{_integer(step.integer)}{_order(step.integer)}{role}"
+    return f"{step.integer.notation}{_order(step.integer)}{role}"
 
 
 def _length(length: Length) -> str:
     return str(length.maximum) if length.minimum == length.maximum else f"{length.minimum}..{length.maximum}"
-
-
-def _integer(integer: Integer) -> str:
-    return f"{'i' if integer.signed else 'u'}{integer.bits}{integer.form}"
 
 
 def _order(integer: Integer) -> str:
@@ -137,7 +134,8 @@ def _facts(scalar: Scalar) -> list[str]:
         )
     elif scalar.unit:
         facts.append(f"in {scalar.unit}")
-    if (not scalar.full_range and scalar.meaning != "bool") or scalar.integer.form:
+    digits = scalar.bcd or isinstance(scalar.text, Digits)
+    if (not scalar.full_range and scalar.meaning != "bool") or digits:
         facts.append(f"{scalar.minimum}..{scalar.maximum}")
     match scalar.meaning:
         case Enum() | Flags():

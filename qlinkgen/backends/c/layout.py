@@ -9,10 +9,12 @@ from qlinkgen.backends.c.crc import field_check
 from qlinkgen.backends.c.forms import Helper, decimal_helpers, row_helpers, wide_helpers
 from qlinkgen.backends.c.names import storage, unsigned, unsigned_type
 from qlinkgen.backends.c.text_forms import Verb, text_helpers
+from qlinkgen.backends.c.words import word_helpers
 from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.digits import Digits
-from qlinkgen.model.integer import BitOrder, Chunk, Integer
+from qlinkgen.model.integer import BitOrder, Chunk, Integer, TextForm
 from qlinkgen.model.types import Scalar
+from qlinkgen.model.words import Words
 
 Chunks = tuple[Chunk, ...]
 #: An integer with a wire layout: the Integer of a frame part, or the Scalar of a field.
@@ -35,6 +37,8 @@ class Layouts:
     _decimals: set[tuple[str, int, str]] = field(default_factory=set)
     #: Numbers as text that are read or written: the base, and the function.
     _texts: set[tuple[int, Verb]] = field(default_factory=set)
+    #: Words that are read or written, and the function.
+    _words: set[tuple[Words, Verb]] = field(default_factory=set)
     #: Rows of bits that are read or written: the width of the C type of an item, and the order.
     _rows: set[tuple[str, int, BitOrder]] = field(default_factory=set)
     #: Algorithms of check values in payloads.
@@ -99,8 +103,12 @@ class Layouts:
         self._partial.add((integer.bits, integer.chunks))
         return f"{self._call('unused_bits', integer)}({pointer(place, index)})"
 
-    def text(self, verb: Verb, integer: AnyInteger, text: Digits, *given: str) -> str:
+    def text(self, verb: Verb, integer: AnyInteger, text: TextForm, *given: str) -> str:
         """A call that writes a number as text: to a place, its size, the value; or its size: the value."""
+        if isinstance(text, Words):
+            self._words.add((text, verb))
+            place = given[:1] if verb == "put" else ()
+            return f"{self.prefix}_{verb}_word_{text.enum}_({', '.join([*place, given[-1]])})"
         self._texts.add((text.base, verb))
         name = f"{self.prefix}_{verb}_{'decimal' if text.base == 10 else 'hex'}_"
         *others, value = given
@@ -113,16 +121,24 @@ class Layouts:
         sign = unsigned(1 << (integer.bits - 1) if integer.signed else 0, 64, hexadecimal=integer.signed)
         return f"{name}({', '.join([*others, f'{text.point}U', wide, sign])})"
 
-    def read(self, integer: AnyInteger, text: Digits, place: str, size: str) -> str:
+    def read(self, integer: AnyInteger, text: TextForm, place: str, size: str) -> str:
         """An expression for the unsigned value of a text."""
+        if isinstance(text, Words):
+            return self._word(text, place, size)
         call = self._text_call("get", integer, text, place, size)
         if integer.signed and integer.bits != storage(integer.bits):
             call = f"({call} & {unsigned((1 << integer.bits) - 1, 64, hexadecimal=True)})"
         return call if storage(integer.bits) == 64 else f"({unsigned_type(integer.bits)}){call}"
 
-    def wrong(self, integer: AnyInteger, text: Digits, place: str, size: str) -> str:
+    def wrong(self, integer: AnyInteger, text: TextForm, place: str, size: str) -> str:
         """A condition that holds where a text is not a number that the integer can hold."""
+        if isinstance(text, Words):
+            return f"{self._word(text, place, size)} > {text.highest}U"
         return f"!{self._text_call('is', integer, text, place, size)}"
+
+    def _word(self, words: Words, place: str, size: str) -> str:
+        self._words.add((words, "get"))
+        return f"{self.prefix}_get_word_{words.enum}_({place}, {size})"
 
     def cells(self) -> str:
         """The prefix of the functions that divide texts at separators."""
@@ -185,6 +201,7 @@ class Layouts:
             *wide_helpers(self.prefix, self._wides),
             *decimal_helpers(self.prefix, self._decimals),
             *text_helpers(self.prefix, self._texts),
+            *word_helpers(self.prefix, self._words),
             *row_helpers(self.prefix, self._rows),
         ]
 

@@ -12,8 +12,8 @@ from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import count_type, unsigned
 from qlinkgen.backends.c.sizes import local, local_size
 from qlinkgen.model import naming
-from qlinkgen.model.digits import Digits
-from qlinkgen.model.integer import Integer
+from qlinkgen.model.integer import Integer, TextForm
+from qlinkgen.model.words import Words
 from qlinkgen.plan.expr import Within
 from qlinkgen.plan.payload import BytesStep, ConstantStep, PayloadPlan, ReservedStep, ValueStep
 from qlinkgen.plan.separated import TextStep, characters, most_texts, needed, text_steps
@@ -71,7 +71,7 @@ def _guarded(step: TextStep, lines: list[str]) -> list[str]:
     return [f"if (message->has_{step.presence.field}) {{", *(f"    {line}" for line in lines), "}"]
 
 
-def _digits(integer: Integer) -> Digits:
+def _digits(integer: Integer) -> TextForm:
     assert integer.text is not None
     return integer.text
 
@@ -152,6 +152,8 @@ class SeparatedEncoder(Encoder):
             put = self.layouts.text("put", step.integer, digits, "payload", f"{digits.most}U", _value(step))
             return [f"{put};", *onward(f"{digits.most}U")]
         put = self.layouts.text("put", step.integer, digits, "payload", "length", _value(step))
+        if last and isinstance(digits, Words):
+            return [f"{put};"]
         return ["{", f"    const size_t length = {_size(step, self.layouts)};", f"    {put};",
                 *(f"    {line}" for line in onward("length")), "}"]  # fmt: skip
 

@@ -41,7 +41,7 @@ _SUPPORT = {
     "_fconditional": "ConditionalFrame Present",
     "_fasked": "Asked Told",
     "_frecords": "Record",
-    "_ftexts": "BetweenField Letters Separated TextNumber",
+    "_ftexts": "BetweenField Letters Separated TextNumber Word",
     "_kinds": "Kind Kinds",
     "_fended": "EndedKind",
     "_ftrimmed": "Trimmed",

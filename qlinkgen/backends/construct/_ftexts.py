@@ -21,6 +21,7 @@ from construct import (
     Renamed,
     StringError,
     ValidationError,
+    Validator,
     stream_read,
     stream_read_entire,
     stream_write,
@@ -119,6 +120,40 @@ class TextNumber(Construct):
         return self.most
 
 
+class Word(Construct):
+    """One of several words: an integer, the place of the word.
+
+    One of variable size is all bytes, which the Message limits.
+    """
+
+    def __init__(self, *words: bytes) -> None:
+        super().__init__()
+        self.words = words
+        self.minimum = min(map(len, words))
+        self.maximum = max(map(len, words))
+
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> int:
+        if self.minimum == self.maximum:
+            text = stream_read(stream, self.maximum, path)
+        else:
+            text = stream_read_entire(stream, path)
+        if text not in self.words:
+            raise ValidationError(f"{text!r} is not one of the words", path=path)
+        return self.words.index(text)
+
+    def _build(
+        self, obj: object, stream: BinaryIO, context: Container, path: str
+    ) -> object:
+        if not isinstance(obj, int) or not 0 <= obj < len(self.words):
+            raise IntegerError(f"{obj!r} is not the number of a word", path=path)
+        text = self.words[obj]
+        stream_write(stream, text, len(text), path)
+        return obj
+
+    def _sizeof(self, context: Container, path: str) -> int:
+        return self.maximum
+
+
 class BetweenField(TextField):
     """7-bit text without some characters."""
 
@@ -192,7 +227,7 @@ class Separated(Message):
             least, most = _sizes(field)
             if not least <= len(text) <= most:
                 raise RangeError(f"{field.name} has {len(text)} characters", path=path)
-            if isinstance(field.subcon, Rebuild):
+            if _is_ignored(field):
                 continue
             found = field.parse(text, number=len(text))
             if isinstance(field.subcon, Default):
@@ -215,6 +250,12 @@ class Separated(Message):
         if field.name in self.optional and values[field.name] is None:
             return b""
         return self._written(field, values.get(field.name), values, path)
+
+
+def _is_ignored(field: Renamed) -> bool:
+    """Whether it may be anything when received; one of several constants may not."""
+    rebuilt = field.subcon
+    return isinstance(rebuilt, Rebuild) and not isinstance(rebuilt.subcon, Validator)
 
 
 def _sizes(field: Renamed) -> tuple[int, int]:

@@ -18,6 +18,7 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.types import Characters, Enum, Flags, Float, Scalar, byte_chunks
 from qlinkgen.model.values import native_from_raw
+from qlinkgen.model.words import Words
 from qlinkgen.plan.expr import Clear, Condition, Legible, OneOf, Within
 from qlinkgen.plan.openings import openings
 from qlinkgen.plan.parts import CellPart
@@ -51,6 +52,8 @@ _UNCONFIRMED = "NOT CONFIRMED by a second source."
 def integer(kind: Integer, *, signed: bool | None = None) -> Node:
     """The construct of an integer, Groups if construct does not provide one."""
     signed = kind.signed if signed is None else signed
+    if isinstance(kind.text, Words):
+        return Call("Word", kind.text.words)
     if text := kind.text:
         limits = (("low", kind.minimum), ("high", kind.maximum))
         point = (("point", text.point),) if text.point else ()
@@ -146,7 +149,8 @@ class Types:
     def _labelled(self, kind: str, group: Enum | Flags, members: tuple[tuple[str, Node], ...]) -> Definition:
         size = (group.bits + 7) // 8
         plain = integer(Integer(8 * size, signed=False, chunks=byte_chunks(size, "big")))
-        carrier = self._usual.get(group.name, plain)
+        words = group.words if isinstance(group, Enum) else None
+        carrier = self._usual.get(group.name, Call("Word", words.words) if words else plain)
         if any(keyword.iskeyword(name) or name in ("self", "subcon") for name, _ in members):
             node = Call(kind, (carrier, Sequence(tuple(Call("Member", each) for each in members))))
         else:

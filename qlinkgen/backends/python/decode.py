@@ -11,6 +11,7 @@ from qlinkgen.backends.python.layout import WIDTH, indented, literal, slice_of, 
 from qlinkgen.backends.python.names import held
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
+from qlinkgen.model.digits import Digits
 from qlinkgen.model.integer import Integer, packed_size
 from qlinkgen.model.types import Characters, Enum, Flags, Float, Scalar
 from qlinkgen.plan.envelope import Envelope
@@ -296,7 +297,8 @@ class Decoder:
     def _number_in(self, integer: Integer, text: str) -> str:
         """The number of a text, above its maximum if it is illegal."""
         assert integer.text
-        self.place.use("read_decimal" if integer.text.base == 10 else "read_hexadecimal")
+        if isinstance(integer.text, Digits):
+            self.place.use("read_decimal" if integer.text.base == 10 else "read_hexadecimal")
         return integers.number_in(integer, text)
 
     def _size(self, integer: Integer, local: str, at: Size, name: str = "", offset: str = "") -> str:

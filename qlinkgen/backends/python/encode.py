@@ -17,6 +17,7 @@ from qlinkgen.backends.python.names import attribute, source_of
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
 from qlinkgen.backends.python.varied import closed, ends, is_sized, octets_of
+from qlinkgen.model.digits import Digits
 from qlinkgen.model.integer import Integer, packed_size
 from qlinkgen.model.types import Characters, Float
 from qlinkgen.plan.expr import Condition, Within
@@ -272,7 +273,7 @@ class Encoder:
 
     def _use_text(self, integer: Integer) -> None:
         """Import what writes the text of a number."""
-        if integer.text and integer.text.point:
+        if isinstance(integer.text, Digits) and integer.text.point:
             self.place.use("decimal")
 
     def _step(self, step: Step) -> None:  # noqa: C901  # a case a step

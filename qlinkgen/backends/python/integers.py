@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.backends.python.layout import slice_of
-from qlinkgen.model.digits import Digits
-from qlinkgen.model.integer import ByteOrder, Chunk, Integer
+from qlinkgen.model import naming
+from qlinkgen.model.integer import ByteOrder, Chunk, Integer, TextForm
+from qlinkgen.model.words import Words
 from qlinkgen.plan.expr import Clear, Condition, Legible, OneOf, Size, Term, Within
 from qlinkgen.plan.payload import CountStep
 
@@ -66,8 +67,20 @@ def to_bytes(integer: Integer, number: str) -> str:
     return f'{number}.to_bytes({integer.size}, "{integer.byteorder}"{_signed(integer)})'
 
 
-def text_of(text: Digits, number: str) -> str:
+def words_of(words: Words) -> str:
+    """Name of the table of the words of an enum."""
+    return f"_WORDS_{naming.upper(words.enum)}"
+
+
+def numbers_of(words: Words) -> str:
+    """Name of the table of the numbers of these words."""
+    return f"_NUMBERS_{naming.upper(words.enum)}"
+
+
+def text_of(text: TextForm, number: str) -> str:
     """The text of a number."""
+    if isinstance(text, Words):
+        return f"{words_of(text)}[{number}]"
     if text.point:
         return f"decimal({number}, {text.least}, {text.point})"
     letter = "d" if text.base == 10 else "X"
@@ -77,6 +90,8 @@ def text_of(text: Digits, number: str) -> str:
 def number_in(integer: Integer, text: str) -> str:
     """The number of a text, or one above the maximum of the integer."""
     assert integer.text
+    if isinstance(integer.text, Words):
+        return f"{numbers_of(integer.text)}.get({text}, {integer.maximum + 1})"
     if integer.text.base == 16:
         return f"read_hexadecimal({text}, {integer.maximum})"
     return f"read_decimal({text}, {integer.text.point}, {integer.minimum}, {integer.maximum})"

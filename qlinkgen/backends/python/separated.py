@@ -10,7 +10,6 @@ from qlinkgen.backends.python.decode import assigned, assigned_targets
 from qlinkgen.backends.python.layout import indented, literal, wrapped
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.walked import WalkedDecoder, WalkedEncoder
-from qlinkgen.model.digits import Digits
 from qlinkgen.model.integer import Integer
 from qlinkgen.plan.expr import Size, Within
 from qlinkgen.plan.payload import BytesStep, ConstantStep, ReservedStep, ValueStep
@@ -59,7 +58,7 @@ class SeparatedEncoder(WalkedEncoder):
                 else:
                     self._indexed(step)
                 self._use_text(step.integer)
-                text = integers.text_of(_digits(step.integer), raw)
+                text = integers.to_bytes(step.integer, raw)
             case _:
                 assert_never(step)
         lines = [*self._flushed(), f"{local} = {text}"]
@@ -146,8 +145,3 @@ class SeparatedDecoder(WalkedDecoder):
         self._values.append(f"{raw} = {self._number_in(integer, f'{name}_text')}")
         self._refuse(f"{raw} > {integer.maximum}", name, f"{name}_text", offset)
         return raw
-
-
-def _digits(integer: Integer) -> Digits:
-    assert integer.text is not None
-    return integer.text

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import assert_never
 
 from qlinkgen.backends import python_text
-from qlinkgen.backends.python.layout import WIDTH, in_hex, wrapped
+from qlinkgen.backends.python.integers import numbers_of, words_of
+from qlinkgen.backends.python.layout import WIDTH, in_hex, literal, wrapped
 from qlinkgen.backends.python.names import attribute, class_name
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import (
@@ -26,6 +27,7 @@ from qlinkgen.model.transaction import (
     Step,
 )
 from qlinkgen.model.types import Array, Enum, Flags, NamedValue
+from qlinkgen.model.words import Words
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -49,10 +51,22 @@ class ConstantsModel:
 
 def enum_model(enum: Enum, name: str) -> ConstantsModel:
     """Render model of an enum."""
-    members = [Member(each.name.upper(), str(each.value), _comment(each)) for each in enum.members]
-    return ConstantsModel(
-        name, _doc(enum.doc, enum.section, "Numbers without a name are preserved."), members
-    )
+    members = [
+        Member(each.name.upper(), str(each.value), _comment(each, enum.words)) for each in enum.members
+    ]
+    rest = "Sent as words." if enum.words else "Numbers without a name are preserved."
+    return ConstantsModel(name, _doc(enum.doc, enum.section, rest), members)
+
+
+def word_tables(enums: Iterable[Enum]) -> list[str]:
+    """Definitions of the words of enums, and of their numbers."""
+    lines: list[str] = []
+    for words in (each.words for each in enums if each.words is not None):
+        written = list(map(literal, words.words))
+        lines += wrapped(f"{words_of(words)} = (", [*written, ""] if len(written) == 1 else written, ")", 0)
+        pairs = [f"{word}: {number}" for number, word in enumerate(written)]
+        lines += wrapped(f"{numbers_of(words)} = {{", pairs, "}", 0)
+    return lines
 
 
 def flags_model(flags: Flags, name: str) -> ConstantsModel:
@@ -65,8 +79,11 @@ def flags_model(flags: Flags, name: str) -> ConstantsModel:
     return ConstantsModel(name, _doc(flags.doc, flags.section, f"Masks. {rest}"), members)
 
 
-def _comment(constant: NamedValue) -> list[str]:
-    return python_text.comment(constant.doc, WIDTH - 10)
+def _comment(constant: NamedValue, words: Words | None = None) -> list[str]:
+    doc = constant.doc
+    if words is not None:
+        doc = f"{doc}{'.' * (doc[-1:].isalnum())} Sent as {words.text(constant.value).decode()}".strip()
+    return python_text.comment(doc, WIDTH - 10)
 
 
 def _doc(doc: str, section: str, more: str) -> list[str]:

@@ -434,7 +434,7 @@ def _beside(name: str, integer: Integer, rules: Iterable[Condition]) -> Iterator
         for number in _outside(rule, integer.minimum, integer.maximum):
             yield name, number, integer.pack(number)
     if integer.text and integer.text.fixed:
-        data = b"G" * integer.size
+        data = integer.text.wrong
         yield name, integer.unpack(data), data
     if integer.bcd:
         data = bytes((0xA5, *bytes(integer.size - 1)))

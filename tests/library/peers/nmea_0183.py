@@ -11,7 +11,7 @@ import pynmea2
 
 from qlinkgen.model.fields import Field
 from qlinkgen.model.message import Direction
-from qlinkgen.model.types import Blob
+from qlinkgen.model.types import Blob, Enum, Scalar
 from qlinkgen.schema import find, load
 from tests.library.protocols import Record
 
@@ -48,9 +48,21 @@ _TALKER = re.compile(r"[A-OQ-Z][A-Z]")
 _CLOCKS = ("time", "date")
 
 
-def _text(name: str, value: Any) -> str:
+def _words(field: Field) -> dict[str, str]:
+    """The letters of an enum by name, nothing for other fields."""
+    kind = field.type
+    if not isinstance(kind, Scalar) or not isinstance(kind.meaning, Enum) or kind.meaning.words is None:
+        return {}
+    words = kind.meaning.words
+    return {each.name: words.text(each.value).decode() for each in kind.meaning.members}
+
+
+def _text(field: Field, value: Any) -> str:
+    name = field.name
     if value is None:
         return ""
+    if words := _words(field):
+        return words[value]
     if name == "quality":
         return str(_QUALITY.index(value) if value in _QUALITY else value)
     if isinstance(value, str):
@@ -70,7 +82,7 @@ def build(record: Record) -> bytes | None:
         return None
     kind, fields = _TYPES[record["message"]], record["fields"]
     stated = _fields(record["message"])
-    texts = [_text(each.name, fields[each.name]) for each in stated]
+    texts = [_text(each, fields[each.name]) for each in stated]
     optional = [each.optional for each in stated]
     while optional and optional[-1] and not texts[-1]:
         texts.pop()
@@ -90,7 +102,9 @@ def read(wire: bytes, direction: Direction) -> Record | None:
         if field.name in _CLOCKS:
             continue
         value = getattr(parsed, attribute)
-        if isinstance(field.type, Blob):
+        if words := _words(field):
+            fields[field.name] = {letter: name for name, letter in words.items()}[value] if value else None
+        elif isinstance(field.type, Blob):
             fields[field.name] = value or (None if field.optional else "")
         elif field.name == "quality":
             fields[field.name] = _QUALITY[value] if value < len(_QUALITY) else value

@@ -66,6 +66,8 @@ class FieldMaker:
     taken: set[str] = field(default_factory=set)
     enums: Doc = field(default_factory=dict)
     flags: Doc = field(default_factory=dict)
+    #: Enums of words.
+    spoken: Doc = field(default_factory=dict)
     named: Doc = field(default_factory=dict)
     records: dict[str, Structure] = field(default_factory=dict)
     #: Records of variable size, or with a bit that ends an array.
@@ -88,6 +90,8 @@ class FieldMaker:
                 rng.choice(("u8", "u8", "u16", "i8", "u24", "u32"))
             )
         self.enums[self.words.name(self.taken)] = {"type": "u3", "values": self._members(8)}
+        for _ in range(0 if self.shape.groups else rng.choice((0, 1, 2))):
+            self.spoken[self.words.name(self.taken)] = self._spoken()
         for _ in range(rng.randint(0, 2)):
             self.flags[self.words.name(self.taken)] = self._flags(
                 rng.choice(("u8", "u16", "u24", "u32", "u64"))
@@ -104,7 +108,7 @@ class FieldMaker:
         return {
             key: value
             for key, value in (
-                ("enums", self.enums),
+                ("enums", {**self.enums, **self.spoken}),
                 ("flags", self.flags),
                 ("types", {**self.named, **{name: each.spec for name, each in records.items()}}),
             )
@@ -294,6 +298,39 @@ class FieldMaker:
         low, limit = (-(1 << bits - 1), 1 << bits - 1) if kind[0] == "i" else (0, 1 << bits)
         return {"type": kind, "doc": self.words.text(), "values": self._members(limit, low)}
 
+    def _spoken(self) -> Doc:
+        """An enum of words, of one length or of several."""
+        rng, names = self.rng, set[str]()
+        size = rng.choice((0, 0, 1, 1, 2, 5))
+        characters = "ABCabc019+-?*/%"
+        words = {
+            "".join(rng.choice(characters) for _ in range(size or rng.choice((1, 2, 3, 7))))
+            for _ in range(rng.choice((1, 2, 3, 8)))
+        }
+        listed = rng.sample(sorted(words), len(words))
+        return {"type": "text", "values": {self.words.name(names): word for word in listed}}
+
+    def _word(self, kinds: list[str]) -> tuple[Any, int]:
+        """A word of one of these enums."""
+        rng, name = self.rng, self.rng.choice(kinds)
+        spec: Doc = {"type": name}
+        if rng.random() < 0.5:
+            names = list(self.spoken[name]["values"])
+            key = rng.choice(("default", "default", "const"))
+            several = key == "const" and rng.random() < 0.3
+            spec[key] = rng.sample(names, rng.randint(1, len(names))) if several else rng.choice(names)
+        return spec, self._longest(name)
+
+    def _fixed_word(self) -> tuple[Any, int]:
+        """A word of an enum whose words have one length."""
+        fixed = [
+            name for name in self.spoken if len(set(map(len, self.spoken[name]["values"].values()))) == 1
+        ]
+        return self._word(fixed) if fixed else self._plain()
+
+    def _longest(self, name: str) -> int:
+        return max(map(len, self.spoken[name]["values"].values()))
+
     def _flags(self, kind: str) -> Doc:
         rng, names, bits = self.rng, set[str](), int(kind[1:])
         numbers = {0, bits - 1, *(rng.randrange(bits) for _ in range(2))}
@@ -467,6 +504,9 @@ class FieldMaker:
                 size, optional = int(spec["type"].partition("..")[2][:-1]), low > 0
                 if rng.random() < 0.3 and size > low:
                     spec["default"] = "#" * size
+            elif self.spoken and rng.random() < 0.5:
+                spec, size = self._word(list(self.spoken))
+                optional = "const" not in spec
             else:
                 spec, size = self._text_number()
                 optional = not {"const", "reserved"} & spec.keys()
@@ -705,6 +745,8 @@ class FieldMaker:
     def _packet_size(self, spec: Any) -> int:
         written: Doc = {"type": spec} if isinstance(spec, str) else spec
         base, _, count = written["type"].partition("[")
+        if base in self.spoken:
+            return self._longest(base) * int(count.rstrip("]") or 1)
         if base in self.records:
             return int(self.records[base].size * int(count.rstrip("]") or 1))
         if "packed" in written:
@@ -734,7 +776,7 @@ class FieldMaker:
         made: Callable[[], tuple[Any, int]] = rng.choice(
             (self._plain, self._plain, self._plain, self._ranged, self._truth, self._of_enum, self._of_flags,
              self._scaled, self._fixed_point, self._constant, self._reserved, self._grouped, self._of_named,
-             self._real, self._digits, self._text_number, self._wide)
+             self._real, self._digits, self._text_number, self._fixed_word, self._wide)
         )  # fmt: skip
         return made()
 
@@ -949,6 +991,7 @@ class FieldMaker:
                 self._of_named,
                 self._digits,
                 self._text_number,
+                self._fixed_word,
             )
         )
         spec, size = made()

@@ -273,6 +273,12 @@ class Fields:
         return Run(item, base == "text", low, high, filled, spec.get("packed", ""))
 
     def _number(self, base: str, spec: Doc) -> Number:
+        enum = self._document.get("enums", {}).get(base, {"type": ""})
+        if enum["type"] == "text":
+            given = [each["value"] if isinstance(each, dict) else each for each in enum["values"].values()]
+            words = tuple(each.encode() for each in given)
+            pieces = ((0, 8),) * max(map(len, words))
+            return Number(8, signed=False, pieces=pieces, low=0, high=len(words) - 1, words=words)
         bits, signed, scale, truth, forbidden = self._carrier(base)
         bits = 1 if truth and "packed" in spec else bits
         pieces = () if "packed" in spec else self._pieces(bits, spec)
@@ -336,6 +342,8 @@ class Fields:
         if isinstance(given, bool):
             return replace(number, default=int(given))
         names = self._document.get("enums", {}).get(base, {}).get("values", {})
+        if number.words:
+            return replace(number, default=list(names).index(given))
         if given in names:
             member = names[given]
             return replace(number, default=member["value"] if isinstance(member, dict) else member)

@@ -34,6 +34,8 @@ class Number:
     #: Of a number as text: base, minimum and maximum number of characters, digits after the point, whether
     #: it may have a sign.
     text: tuple[int, int, int, int, bool] | None = None
+    #: Of an enum that is sent as text: its words, whose places are the numbers.
+    words: tuple[bytes, ...] = ()
     #: The integer is the bits of a floating-point number, perhaps with bounds.
     real: bool = False
     bounds: tuple[float, float] | None = None
@@ -245,6 +247,9 @@ class Slot:
         if isinstance(kind, Run):
             return kind.low, kind.most
         assert isinstance(kind, Number)
+        if kind.words:
+            sizes = [len(word) for word in kind.words]
+            return min(sizes), max(sizes)
         assert kind.text
         _, least, most, _, _ = kind.text
         return least if least == most else 1, most

@@ -261,6 +261,8 @@ def met(tests: Sequence[Test], numbers: Mapping[str, int]) -> bool:
 
 
 def _put(number: Number, raw: int) -> bytes:
+    if number.words:
+        return number.words[raw]
     if number.text:
         base, least, _, point, _ = number.text
         if base == 16:
@@ -270,7 +272,11 @@ def _put(number: Number, raw: int) -> bytes:
 
 
 def _get(number: Number, data: bytes) -> int:
-    """The integer of wire bytes. Raises Wrong for a wrong digit."""
+    """The integer of wire bytes. Raises Wrong for a wrong digit, or another word."""
+    if number.words:
+        if data not in number.words:
+            raise Wrong("range", str(data))
+        return number.words.index(data)
     if number.text:
         return _of_text(number, data, number.text)
     pattern = get(number.pieces, data)
@@ -509,7 +515,7 @@ def _decoded(slot: Slot, data: bytes, number: int | None) -> dict[str, Raw]:
         return {slot.name: _decoded_run(kind, data, kind.most if number is None else number)}
     if slot.role in ("reserved", "filled"):
         return {}
-    if not (isinstance(kind, Number) and kind.text) and stray(kind.pieces, data):
+    if not (isinstance(kind, Number) and (kind.text or kind.words)) and stray(kind.pieces, data):
         raise Wrong("range", slot.name)
     if isinstance(kind, Packed):
         whole = get(kind.pieces, data)
