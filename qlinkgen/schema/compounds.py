@@ -172,10 +172,12 @@ def build_array(
         if getattr(spec, key) in (None, False):
             continue
         if key in location.written:
-            location.reject(spec, (key,), "an array")
+            hint = "define a type with these bits, and write an array of it" if key == "bits" else "remove it"
+            location.reject(spec, (key,), "an array", hint)
         else:
             what = f"the items of an array cannot have '{key}', as their type has"
-            location.fault("bad-array", "type", what, "use a field for each")
+            hint = "write the brackets at the field" if key == "bits" else "use a field for each"
+            location.fault("bad-array", "type", what, hint)
     length = build_length(text, item.bits if spec.packed else 8 * item.size, payload_max, location)
     if length is None:
         return None

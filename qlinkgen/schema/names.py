@@ -11,6 +11,7 @@ from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import snake, upper
 from qlinkgen.model.types import Array, Blob, Scalar
+from qlinkgen.schema.bit_items import items_of
 from qlinkgen.schema.file_fields import Fields, RecordSpec
 from qlinkgen.schema.file_frames import PartSpec
 from qlinkgen.schema.file_model import SchemaFile
@@ -207,8 +208,9 @@ def _classes(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
 
 
 def records_of(file: SchemaFile) -> Iterator[str]:
-    """Names of records."""
-    return (name for name, spec in file.types.items() if isinstance(spec, RecordSpec))
+    """Names of records, those of items with bits included."""
+    items = items_of(file)
+    return (name for name, spec in file.types.items() if isinstance(spec, RecordSpec) or name in items)
 
 
 def _messages(file: SchemaFile) -> Iterator[str]:
@@ -257,10 +259,10 @@ def _macro_owners(
     file: SchemaFile, messages: Sequence[Message]
 ) -> Iterator[tuple[str, str, Sequence[str], Path]]:
     """Stem, owner, suffixes and path of constants of the C header."""
+    records = frozenset(records_of(file))
     for name in file.types:
         stem = _type_stem(file, messages, name)
-        record = isinstance(file.types[name], RecordSpec)
-        what, macros = ("record", _RECORD_MACROS) if record else ("type", _TYPE_MACROS)
+        what, macros = ("record", _RECORD_MACROS) if name in records else ("type", _TYPE_MACROS)
         yield stem, f"the {what} '{name}'", macros, ("types", name)
     for name in file.commands:
         for direction in ("request", "response"):

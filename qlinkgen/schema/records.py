@@ -8,6 +8,7 @@ from qlinkgen.model.condition import Condition
 from qlinkgen.model.fields import Field, Layout, Record, Records, applies
 from qlinkgen.model.types import Array, Length, Scalar
 from qlinkgen.model.values import Native, defaults_of
+from qlinkgen.schema.bit_items import bit_types
 from qlinkgen.schema.compounds import build_length
 from qlinkgen.schema.conditions import EndBuilder
 from qlinkgen.schema.file_base import Fact, Lifetime
@@ -34,6 +35,7 @@ class RecordBuilder:
         self._file = file
         self._report = report
         self._fields = fields
+        self._bits = bit_types(file)
         self._built: dict[str, Layout | None] = {}
         #: Records being built, to detect recursion.
         self._open: list[str] = []
@@ -50,7 +52,8 @@ class RecordBuilder:
             text = type_text(spec.type)
         except ValueError:
             return None
-        return text if isinstance(self._file.types.get(text.base), RecordSpec) else None
+        item = text.count is not None and text.base in self._bits
+        return text if item or isinstance(self._file.types.get(text.base), RecordSpec) else None
 
     def build(
         self, spec: FieldSpec, text: TypeText, payload_max: int, location: Location
@@ -125,7 +128,10 @@ class RecordBuilder:
 
     def _new(self, name: str) -> Layout | None:
         spec, path = self._file.types[name], ("types", name)
-        assert isinstance(spec, RecordSpec)
+        if not isinstance(spec, RecordSpec):
+            spec = self._bits[name]
+            self._report.move((*path, "fields"), path)
+            self._report.move((*path, "fields", name), path)
         before = len(self._report.faults)
         layout = Layout(
             name, self._fields(spec.fields, (*path, "fields")), spec.doc, spec.section, spec.confirmed

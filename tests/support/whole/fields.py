@@ -70,6 +70,8 @@ class FieldMaker:
     spoken: Doc = field(default_factory=dict)
     named: Doc = field(default_factory=dict)
     records: dict[str, Structure] = field(default_factory=dict)
+    #: Integers with bits, which arrays have as records.
+    bitty: dict[str, Structure] = field(default_factory=dict)
     #: Records of variable size, or with a bit that ends an array.
     varied: dict[str, Structure] = field(default_factory=dict)
     #: Fraction of fields that are records.
@@ -80,6 +82,11 @@ class FieldMaker:
     choosing: float = 0.15
     #: Fraction of messages and records with numbers that follow from other fields.
     filled: float = 0.2
+
+    @property
+    def arrayed(self) -> dict[str, Structure]:
+        """What arrays may have as records of fixed size."""
+        return {**self.records, **self.bitty}
 
     def types(self) -> Doc:
         """Enums, flags and named types."""
@@ -99,12 +106,14 @@ class FieldMaker:
         for _ in range(rng.randint(0, 3)):
             name = self.words.name(self.taken)
             self.named[name] = self._scalar()[0]
+        for _ in range(rng.choice((0, 0, 1, 2))):
+            self._new_bits()
         for _ in range(rng.choice((0, 1, 2, 3))):
             self._new_record()
         if not (self.shape.word > 1 or self.shape.trimmed or self.shape.kind == "packet"):
             for _ in range(rng.choice((0, 0, 1, 2))):
                 self._new_varied()
-        records = {**self.records, **self.varied}
+        records = {**self.bitty, **self.records, **self.varied}
         return {
             key: value
             for key, value in (
@@ -115,6 +124,19 @@ class FieldMaker:
             if value
         }
 
+    def _new_bits(self) -> None:
+        """A named integer with bits."""
+        rng, taken = self.rng, set[str]()
+        if rng.random() < 0.5 and not self.shape.groups:
+            number, more = self.words.name(taken), self.words.name(taken)
+            spec: Any = {"type": "u8", "bits": {number: "0..6", more: 7}}
+            size, last = 1, {more: rng.choice((False, 0))}
+        else:
+            spec, size = self._packed(taken)
+            last = {}
+        if isinstance(spec, dict) and "bits" in spec:
+            self.bitty[self.words.name(self.taken)] = Structure(spec, size, 1, last)
+
     def _new_record(self) -> None:
         """A record of fixed size, perhaps with records in it."""
         inner, taken = [name for name, each in self.records.items() if each.depth == 1], set[str]()
@@ -122,10 +144,18 @@ class FieldMaker:
         size, depth, has_value = 0, 1, False
         for _ in range(self.rng.choice((1, 2, 3, 5))):
             name, roll = self.words.name(taken), self.rng.random()
-            if inner and roll < 0.2:
+            if self.bitty and roll < 0.05:
+                kind, times, depth = (
+                    self.rng.choice(list(self.bitty)),
+                    self.rng.choice((1, 2, 3)),
+                    max(2, depth),
+                )
+                spec: Any = f"{kind}[{times}]"
+                more = self.bitty[kind].size * times
+            elif inner and roll < 0.2:
                 kind = self.rng.choice(inner)
                 times, depth = self.rng.choice((0, 0, 1, 2, 3)), 2
-                spec: Any = f"{kind}[{times}]" if times else kind
+                spec = f"{kind}[{times}]" if times else kind
                 more = self.records[kind].size * max(1, times)
             elif roll < 0.35:
                 spec, more = self._fixed_run()
@@ -212,11 +242,17 @@ class FieldMaker:
             kind, spec, step = self._variable_kind()
             most = rng.choice((1, 2, 5))
             self._counted(name, f"{kind}[0..{most}]", spec, made, taken=taken)
-            return 2 + most * step, self.records[kind].depth if kind in self.records else 0
+            return 2 + most * step, self.arrayed[kind].depth if kind in self.arrayed else 0
         if roll < 0.7:
             spec, step = self._plain()
             made[name] = {**(spec if isinstance(spec, dict) else {"type": spec}), "if": test}
             return step, 0
+        if roll < 0.75 and self.bitty:
+            kind = rng.choice(list(self.bitty))
+            other = self.bitty[kind]
+            kept = {"if": test} if rng.random() < 0.5 else {}
+            made[name] = {"type": f"{kind}[1..3]", "last": other.last, **kept} if other.last else f"{kind}[2]"
+            return 3 * other.size, 1
         if roll < 0.85 and inner:
             kind = rng.choice(inner)
             other = self.varied[kind]
@@ -261,7 +297,7 @@ class FieldMaker:
             most = min(most, 2)
             made.append((name, rng.choice((kind, f"{kind}[{most}]"))))
         elif roll < 0.5 and room.open_end:
-            made.append((name, f"{kind}[{rng.choice((0, 0, 1))}..{most}]"))
+            made.append((name, f"{kind}[{rng.choice((0, 0, min(1, most - 1)))}..{most}]"))
             room.open_end = False
         else:
             units = (
@@ -453,7 +489,7 @@ class FieldMaker:
         if isinstance(case, dict) and "type" not in case:
             return int(bool(case))
         kind = str(case["type"] if isinstance(case, dict) else case).partition("[")[0]
-        return self.records[kind].depth if kind in self.records else 0
+        return self.arrayed[kind].depth if kind in self.arrayed else 0
 
     def _tag(self, taken: set[str]) -> tuple[tuple[str, Any], int, str, int, int]:
         """A field that a choice may test: itself, its size, the reference, and its range."""
@@ -706,7 +742,7 @@ class FieldMaker:
         if self.varied and not room.fixed and self.rng.random() < 2 * self.structured:
             self._varied_field(name, made, taken, room)
             return
-        if self.records and self.rng.random() < self.structured:
+        if self.arrayed and self.rng.random() < self.structured:
             spec, size = self._of_record()
         elif roll < 0.42:
             spec, size = self._fixed_run()
@@ -747,8 +783,8 @@ class FieldMaker:
         base, _, count = written["type"].partition("[")
         if base in self.spoken:
             return self._longest(base) * int(count.rstrip("]") or 1)
-        if base in self.records:
-            return int(self.records[base].size * int(count.rstrip("]") or 1))
+        if base in self.arrayed:
+            return int(self.arrayed[base].size * int(count.rstrip("]") or 1))
         if "packed" in written:
             base = self.enums.get(base, {"type": base})["type"]
             return -(-int(count.rstrip("]")) * (1 if base == "bool" else int(base[1:])) // 8)
@@ -1030,11 +1066,13 @@ class FieldMaker:
 
     def _of_record(self) -> tuple[Any, int]:
         """One record, or a constant number of them."""
-        name, times = self.rng.choice(list(self.records)), self.rng.choice((0, 0, 1, 2, 4))
+        known = self.arrayed
+        name, times = self.rng.choice(list(known)), self.rng.choice((0, 0, 1, 2, 4))
+        times = max(1, times) if name in self.bitty else times
         spec: Any = f"{name}[{times}]" if times else name
         if self.rng.random() < 0.3:
             spec = {"type": spec, "doc": self.words.text()}
-        return spec, self.records[name].size * max(1, times)
+        return spec, known[name].size * max(1, times)
 
     def _bits_in_a_row(self) -> tuple[str, Doc, int]:
         """Type, keys and bits of an item of a packed array."""
@@ -1128,9 +1166,9 @@ class FieldMaker:
                 number = most * (step if unit == "bytes" else 1)
                 self._count(name, unit, number, made, opened, taken=taken, room=room)
                 opened += 1
-        elif low == 0 and rng.random() < 0.3 and kind in ("bytes", "text", *self.records):
-            spec["type"] = f"{kind}[]" if kind in self.records else kind
-            most = int(kind in self.records)
+        elif low == 0 and rng.random() < 0.3 and kind in ("bytes", "text", *self.arrayed):
+            spec["type"] = f"{kind}[]" if kind in self.arrayed else kind
+            most = int(kind in self.arrayed)
         made.append((name, spec))
         room.left -= most * step
         room.open_end = room.open_end and counted
@@ -1165,9 +1203,9 @@ class FieldMaker:
     def _variable_kind(self) -> tuple[str, Doc, int]:
         rng = self.rng
         kinds = ["array", *(["text"] if self.shape.text else []), *([] if self.shape.groups else ["bytes"])]
-        if self.records and rng.random() < 2 * self.structured:
-            name = rng.choice(list(self.records))
-            return name, {}, self.records[name].size
+        if self.arrayed and rng.random() < 2 * self.structured:
+            name = rng.choice(list(self.arrayed))
+            return name, {}, self.arrayed[name].size
         kind = rng.choice(kinds)
         if kind != "array":
             return kind, {}, 1

@@ -217,17 +217,25 @@ class Fields:
             record = Record(self.build(self._document["types"][base]["fields"]))
             if not bracket:
                 return Slot(name, record)
-            low, high = whole_span(count.rstrip("]")) if count.rstrip("]") else (0, None)
-            last = self._conditional(
-                Slot(name, record), {"if": spec.get("last", {})}, list(record.slots)
-            ).when
-            return Slot(name, Records(record, low, high, last=last))
+            return Slot(name, self._records(name, record, count, spec))
+        if bracket and "bits" in spec:
+            item = Record((self._divided(name, base, spec),))
+            return Slot(name, self._records(name, item, count, spec))
         if base in ("bytes", "text") or bracket:
             return Slot(name, self._run(base, count.rstrip("]"), spec))
-        number = self._number(base, spec)
         if "bits" in spec:
-            members = tuple(self._member(*each) for each in spec["bits"].items())
-            return Slot(name, Packed(number.pieces, number.bits, members))
+            return self._divided(name, base, spec)
+        return self._single(name, base, spec)
+
+    def _divided(self, name: str, base: str, spec: Doc) -> Slot:
+        """An integer with bits."""
+        number = self._number(base, spec)
+        members = tuple(self._member(*each) for each in spec["bits"].items())
+        return Slot(name, Packed(number.pieces, number.bits, members))
+
+    def _single(self, name: str, base: str, spec: Doc) -> Slot:
+        """A single number."""
+        number = self._number(base, spec)
         if "counts" in spec:
             more, scale = -int(spec.get("offset", 0)), int(spec.get("scale", 1))
             unit = spec.get("counts_in", "items")
@@ -246,6 +254,11 @@ class Fields:
         key = "const" if "const" in spec else "default"
         role: Role = "constant" if "const" in spec else "value"
         return Slot(name, self._with_default(number, base, spec, key), role)
+
+    def _records(self, name: str, record: Record, count: str, spec: Doc) -> Records:
+        low, high = whole_span(count.rstrip("]")) if count.rstrip("]") else (0, None)
+        last = self._conditional(Slot(name, record), {"if": spec.get("last", {})}, list(record.slots)).when
+        return Records(record, low, high, last=last)
 
     def _run(self, base: str, count: str, spec: Doc) -> Run:
         item = None if base in ("bytes", "text") else _quantified(self._number(base, spec), spec)
