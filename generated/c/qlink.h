@@ -2432,7 +2432,8 @@ static inline qlink_event_t qlink_receive(qlink_receiver_t *receiver, uint8_t by
 
 /* ---- Slave ----
  * One function for each command. A command without a function, or whose function returns false, gets no response.
- * Only valid requests are passed to functions. The response is initialised with its defaults. During a broadcast,
+ * Only valid requests are passed to functions. The response is initialised with its defaults, and what it repeats of
+ * the request is set. During a broadcast,
  * `broadcast` is set; the response has the slave's node as set by the function. */
 typedef struct qlink_slave qlink_slave_t;
 
@@ -2546,6 +2547,7 @@ static inline int qlink_slave_node_program_load_(
         return 0;
     }
     if (qlink_node_program_load_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        response.counter = request.counter;
         const bool answers = (slave->node_program_load)(slave, &request, &response);
         if (answers) {
             size = qlink_node_program_load_response_to_frame(&response, slave->node, wire, capacity);
@@ -2617,6 +2619,7 @@ static inline int qlink_slave_motion_(qlink_slave_t *slave, const qlink_frame_t 
         return 0;
     }
     if (qlink_motion_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        response.counter = request.counter;
         const bool answers = (slave->motion)(slave, &request, &response);
         if (answers) {
             size = qlink_motion_response_to_frame(&response, slave->node, wire, capacity);
@@ -2779,6 +2782,11 @@ static inline int qlink_slave_loop_back_(
         return 0;
     }
     if (qlink_loop_back_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        response.offset = request.offset;
+        response.data_size = (uint8_t)request.data_size;
+        for (size_t index = 0U; index < request.data_size; ++index) {
+            response.data[index] = request.data[index];
+        }
         const bool answers = (slave->loop_back)(slave, &request, &response);
         if (answers) {
             size = qlink_loop_back_response_to_frame(&response, slave->node, wire, capacity);

@@ -109,7 +109,7 @@ def _layout(title: str, stated: Message | Layout, payload: PayloadPlan) -> None:
     moving += payload.steps[1:] if payload.separator else []
     for field, step in zip(stated.fields, payload.steps, strict=True):
         offset = step.place.offset
-        notes = ["echo"] if field.echo else []
+        notes = [f"= request.{field.repeats}"] if field.repeats else []
         notes += [] if field.confirmed else [UNCONFIRMED]
         if step.presence:
             notes.append("empty if absent" if payload.separator else presence_text(step.presence))

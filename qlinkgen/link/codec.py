@@ -90,7 +90,7 @@ class OtherReply(Protocol):
     cases: tuple[tuple[int, int, str], ...]
     within: tuple[float, float] | None
     after: tuple[float, float]
-    echoes: tuple[str, ...]
+    echoes: Mapping[str, str | int]
 
     @property
     def message(self) -> type[Framed]:
@@ -128,7 +128,7 @@ class Command(Protocol):
     response_byte_times: float
     response_seconds: float
     repeat_safe: bool
-    echoes: tuple[str, ...]
+    echoes: Mapping[str, str | int]
     sizes: tuple[tuple[str, str, int], ...]
 
     @property
@@ -296,20 +296,43 @@ def missized(response: Message, name: str, command: Command, asked: Message) -> 
     )
 
 
+#: What fields of an answer repeat, by name: an attribute of the request, or a number.
+Echoes = Mapping[str, str | int]
+
+
+def repeats(echoes: Echoes, request: Message, response: Message) -> bool:
+    """Whether an answer has what it repeats of a request."""
+    for name, of in echoes.items():
+        if getattr(response, name) != (getattr(request, of) if isinstance(of, str) else of):
+            return False
+    return True
+
+
+def fill(echoes: Echoes, request: Message, response: Message) -> None:
+    """Give an answer what it repeats of a request; a field that may be absent stays so."""
+    for name, of in echoes.items():
+        if getattr(response, name) is not None:
+            setattr(response, name, getattr(request, of) if isinstance(of, str) else of)
+
+
+def echoes_of(command: Command, answer: type[Message]) -> Echoes | None:
+    """What an answer of a class repeats, None if it does not answer the command."""
+    if answer is command.response:
+        return command.echoes
+    reply = command.replies.get(answer)
+    return None if reply is None else reply.echoes
+
+
 def answers(command: Command, request: Message, asked: Message, response: Message) -> bool:
     """Whether an answer has a right class for a request, equal echoed fields and the sizes asked for.
 
     ``asked`` is the frame that may say the sizes, as in `wrong_size`.
     """
-    if type(response) is command.response:
-        echoes = command.echoes
-        if command.sizes and wrong_size(command, asked, response):
-            return False
-    elif reply := command.replies.get(type(response)):
-        echoes = reply.echoes
-    else:
+    sized = type(response) is command.response and bool(command.sizes)
+    if sized and wrong_size(command, asked, response):
         return False
-    return all(getattr(response, name) == getattr(request, name) for name in echoes)
+    echoes = echoes_of(command, type(response))
+    return echoes is not None and repeats(echoes, request, response)
 
 
 def addresses_that_answer(command: Command, request: Message, bus: Bus) -> Sequence[int | None]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from qlinkgen.link.codec import Framed, OtherReply, wrong_size
+from qlinkgen.link.codec import Framed, OtherReply, repeats, wrong_size
 from qlinkgen.link.counters import LinkCounters
 from qlinkgen.link.transaction import CommandTiming
 
@@ -47,9 +47,8 @@ class Pending:
     def answered_by(self, response: Framed, node: int | None) -> bool:
         """Whether a response of the right class from a node is the answer."""
         command, request = self.command, self.request
-        for name in command.echoes:
-            if getattr(response, name) != getattr(request, name):
-                return False
+        if command.echoes and not repeats(command.echoes, request, response):
+            return False
         if command.sizes and wrong_size(command.definition, self.asked, response):
             return False
         if command.accepts is not None:
@@ -66,8 +65,7 @@ class Pending:
         sizes = self.command.sizes if type(message) is self.command.response else ()
         if sizes and wrong_size(self.command.definition, self.asked, message):
             return None
-        same = all(getattr(message, name) == getattr(self.request, name) for name in reply.echoes)
-        return reply if same else None
+        return reply if repeats(reply.echoes, self.request, message) else None
 
     def from_asked(self, node: int | None) -> bool:
         """Whether a node was asked."""

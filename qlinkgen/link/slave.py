@@ -12,6 +12,8 @@ from qlinkgen.link.codec import (
     Framed,
     Message,
     address_of,
+    echoes_of,
+    fill,
     is_message,
     missized,
     wrong_size,
@@ -79,8 +81,8 @@ class SlaveEngine:
     """Decodes the requests to a node, and encodes its answers.
 
     A handler returns the answer: the response, or another reply of the schema, which it may raise in a
-    `Refusal` instead. An answer that takes longer is given to `answer` later; until then the handler returns
-    None, or a reply that means pending.
+    `Refusal` instead. What it repeats of the request is filled in. An answer that takes longer is given to
+    `answer` later; until then the handler returns None, or a reply that means pending.
 
     Attributes:
         node: the behaviour of the node.
@@ -137,6 +139,7 @@ class SlaveEngine:
             for each in codec.COMMANDS.values()
             if each.many is not None and hasattr(each.many, "each") and not getattr(each.many, "by", None)
         }
+        self._commands = {each.request: each for each in codec.COMMANDS.values()}
         self._sized = {command.sized_by: command for command in codec.COMMANDS.values() if command.sizes}
         self._dialogues = {each.request: each for each in codec.COMMANDS.values() if each.steps}
         #: Classes of the frames of masters that are only part of dialogues.
@@ -288,13 +291,14 @@ class SlaveEngine:
     def _queue(self, request: Framed, response: Message | Sequence[Message], now: float) -> None:
         """Encode one answer or several; the further ones follow the first."""
         several: Sequence[Message] = response if isinstance(response, list | tuple) else (response,)
-        asked = request
+        asked = begun = request
         if (dialogue := self._dialogue) is not None:
-            asked = dialogue.asked
+            asked, begun = dialogue.asked, dialogue.request
             dialogue.until = None
             dialogue.check(several)
         for each in several:
             self._check(asked, each)
+            self._fill(begun, each)
         self._further = [self._encoded(request, each) for each in several]
         self._await_next(self._further, now)
         self._answer = self._further.pop(0) if several else b""
@@ -304,6 +308,12 @@ class SlaveEngine:
         if self.numbering is not None:
             self.numbering.answer(response)
         return self._encode(response)
+
+    def _fill(self, request: Framed, response: Message) -> None:
+        """Give an answer what it repeats of the request that began its transaction."""
+        command = self._commands.get(type(request))
+        if command is not None and (echoes := echoes_of(command, type(response))):
+            fill(echoes, request, response)
 
     def _check(self, request: Framed, response: Message) -> None:
         """Refuse a response of another size than the request asks for, which a master would not accept."""

@@ -105,8 +105,8 @@ class Field:
     doc: Text = ""
     section: Text = ""
     confirmed: bool = True
-    #: It repeats the field of the same name of the request.
-    echo: bool = False
+    #: What it repeats of the request: a value, or a part of its frame; "" for others.
+    repeats: str = ""
     #: It is present only where this holds.
     when: Condition = ()
     #: It may be left out at the end.

@@ -97,8 +97,8 @@ class Message:
 
     @property
     def echoes(self) -> tuple[str, ...]:
-        """Values that repeat the value of the same name in the request."""
-        return (*self.echoed, *(value.name for value in self.values if value.field.echo))
+        """Values that repeat something of the request."""
+        return (*self.echoed, *(value.name for value in self.values if value.field.repeats))
 
     @property
     def docs(self) -> dict[str, str]:

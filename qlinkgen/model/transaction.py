@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from types import MappingProxyType
@@ -78,10 +78,17 @@ class Reply:
         found = (case.means for case in self.cases if case.first <= raw <= case.last)
         return next(found, self.means)
 
-    @property
-    def echoes(self) -> tuple[str, ...]:
-        """Values that repeat the value of the same name in the request."""
-        return self.message.echoes
+
+@dataclass(frozen=True, slots=True)
+class Echo:
+    """A value of an answer that repeats something of the request.
+
+    ``of`` is the name of a value of the request, or a number that is the same in all requests of a command.
+    """
+
+    answer: str
+    value: str
+    of: str | int
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,6 +199,8 @@ class Command:
     outcome: Reply | None = None
     #: The side that sends the request.
     asker: Asker = "first"
+    #: What the fields of its answers repeat.
+    echoes: tuple[Echo, ...] = ()
     #: Protocol-specific attributes; names and values are declared in the schema.
     attributes: Labels = field(default_factory=lambda: MappingProxyType({}))
 
@@ -200,10 +209,12 @@ class Command:
         """The list whose nodes answer one by one, None for other commands."""
         return self.many if isinstance(self.many, ByEach) else None
 
-    @property
-    def echoes(self) -> tuple[str, ...]:
-        """Values of the response that repeat the value of the same name in the request."""
-        return self.response.echoes if self.response else ()
+    def repeated(self, answer: Message | None) -> Mapping[str, str | int]:
+        """The values of one of its answers that repeat its request: `Echo.of` by their names."""
+        if answer is None:
+            return {}
+        own = {each.value: each.of for each in self.echoes if each.answer == answer.name}
+        return {**{name: name for name in answer.echoed}, **own}
 
     @property
     def meant(self) -> tuple[Reply, ...]:

@@ -32,7 +32,7 @@ from qlinkgen.schema.kinds import (
     Text,
     WholeRange,
 )
-from qlinkgen.schema.notation import TestText, Wanted
+from qlinkgen.schema.notation import REPEATED, TestText, Wanted
 
 
 class GroupSpec(FileMapping):
@@ -150,7 +150,9 @@ class FieldSpec(Fact, Lifetime):
         default=None, description="Earlier fields, one after the other, that a check value covers"
     )
     equals: str | None = Field(
-        default=None, description="Earlier field with the same value; ~FIELD, FIELD + N: derived from it"
+        default=None,
+        description="Earlier field with the same value; ~FIELD, FIELD + N: derived from it; in an answer, "
+        "request.NAME: a field of its request, or a part of its frame",
     )
     reserved: StrictBool = Field(default=False, description="Sent as zero (or const), ignored when received")
     counts: Annotated[Names, Field(min_length=1)] | None = Field(
@@ -177,6 +179,20 @@ class FieldSpec(Fact, Lifetime):
     def case(self) -> CaseOf | None:
         """What it is a case of, None for other fields."""
         return self._case
+
+    def repeated(self, name: str) -> str:
+        """What a field called ``name`` repeats of the request, "" if nothing."""
+        match = REPEATED.match(self.equals or "")
+        return match["name"] if match else name if self.echo else ""
+
+    @property
+    def itself(self) -> FieldSpec:
+        """The field without what it repeats."""
+        if not REPEATED.match(self.equals or ""):
+            return self
+        found = self.model_copy(update={"equals": None})
+        found.model_fields_set.discard("equals")
+        return found
 
     def as_case(self, case: CaseOf, when: TestText) -> FieldSpec:
         """The field as a case of a choice, present where a condition holds."""

@@ -14,7 +14,7 @@ from qlinkgen.model.protocol import Protocol
 from qlinkgen.schema.addresses import check_addresses
 from qlinkgen.schema.asked import check_told
 from qlinkgen.schema.commands import CommandBuilder, build_bus
-from qlinkgen.schema.echoes import check_echoes
+from qlinkgen.schema.echoes import EchoBuilder
 from qlinkgen.schema.examples import build_examples
 from qlinkgen.schema.fields import FieldBuilder
 from qlinkgen.schema.frame_kinds import begun, build_kinds, check_kind_names, check_used
@@ -168,7 +168,7 @@ def _build(
     if isinstance(frame, FrameKinds):
         check_used(frame, commands.messages, report)
         frame = begun(frame, commands.messages, report)
-    check_echoes(file, commands.commands, messages.places, report)
+    transactions = EchoBuilder(file, frame, messages.places, report).build(commands.commands)
     check_terminator(frame, commands.messages, report)
     types.report_unused()
     check_names(file, frame, commands.messages, messages.places, report)
@@ -187,14 +187,14 @@ def _build(
         flags=tuple(types.flags.values()),
         frame=frame,
         bus=bus,
-        commands=tuple(commands.commands),
+        commands=tuple(transactions),
         messages=tuple(commands.messages),
         schema_hash=hashlib.sha256(text.replace("\r\n", "\n").encode()).hexdigest()[:12],
         schema_file=file_name,
         includes=file.include or "",
         version=str(version) if version else "",
     )
-    protocol = replace(protocol, to_unknown=UnknownBuilder(file, report, frame, commands.commands).build())
+    protocol = replace(protocol, to_unknown=UnknownBuilder(file, report, frame, transactions).build())
     check_told(protocol, messages.id_places, report)
     # With another checksum, or in another version, the bytes of the document are wrong.
     examples = build_examples(file, protocol, report) if crc is None and version is None else ()

@@ -29,6 +29,8 @@ _VERSION = re.compile(r"[0-9]{1,9}(?:\.[0-9]{1,9}){0,5}\Z", re.ASCII)
 DERIVED = re.compile(
     r"\s*(?P<not>~?)\s*(?P<name>[a-z][a-z0-9_]*)\s*(?P<added>[-+]\s*[0-9]{1,20})?\s*\Z", re.ASCII
 )
+#: What a field of an answer repeats of its request: request.NAME.
+REPEATED = re.compile(r"\s*request\s*\.\s*(?P<name>[a-z][a-z0-9_]*)\s*\Z", re.ASCII)
 _SECONDS = {"us": Fraction(1, 10**6), "ms": Fraction(1, 1000), "s": Fraction(1)}
 _MAX_POWER = 128
 _MAX_SHOWN = 60

@@ -386,7 +386,7 @@ _ALL = (
     ),
     Rule(
         "bad-echo",
-        "An echo is a field of a response; its request has a field of the same name and type.",
+        "A field of an answer repeats a field of its request, or a part of its frame, that it can hold.",
         "It identifies the request that a response belongs to.",
     ),
     Rule(

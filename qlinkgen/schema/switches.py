@@ -24,7 +24,7 @@ _RULE = "bad-switch"
 OTHER = "other"
 #: Keys that a case does not have, by attribute: the choice decides whether it is present, and it has a value.
 _FOREIGN = {
-    "counts": "counts", "echo": "echo", "when": "if", "optional": "optional",
+    "counts": "counts", "echo": "echo", "equals": "equals", "when": "if", "optional": "optional",
     "const": "const", "reserved": "reserved", "bits": "bits",
 }  # fmt: skip
 

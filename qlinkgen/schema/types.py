@@ -67,6 +67,8 @@ class TypeBuilder:
         for attribute, key in (
             ("counts", "counts"),
             ("echo", "echo"),
+            ("equals", "equals"),
+            ("algorithm", "algorithm"),
             ("when", "if"),
             ("optional", "optional"),
             *((key, key) for key in ("since", "until", "deprecated")),

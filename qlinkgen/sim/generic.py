@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from qlinkgen.link.asked import answer_to
-from qlinkgen.link.codec import Codec, Command, Framed, Many, Message, is_message
+from qlinkgen.link.codec import Codec, Command, Echoes, Framed, Many, Message, is_message
 from qlinkgen.link.many import nodes_asked
 from qlinkgen.link.slave_dialogue import Handling
 from qlinkgen.plan import Plan
@@ -104,15 +104,16 @@ class GenericNode:
             else:
                 last = kind is command.response
                 answers.append(
-                    self._answer(kind, request, command.echoes if last else (), sizes if last else {})
+                    self._answer(kind, request, command.echoes if last else {}, sizes if last else {})
                 )
         return answers
 
     def _answer(
-        self, kind: type[Message], request: Framed, echoes: Iterable[str], given: Mapping[str, object]
+        self, kind: type[Message], request: Framed, echoes: Echoes, given: Mapping[str, object]
     ) -> Message:
         values = dict(self._required.get(kind) or required_values(kind))
-        values |= {name: getattr(request, name) for name in echoes} | dict(given)
+        values |= {name: getattr(request, of) if isinstance(of, str) else of for name, of in echoes.items()}
+        values |= given
         if address := kind.ADDRESS:
             values[address] = self.number
         make: Callable[..., Message] = kind
@@ -127,13 +128,16 @@ class GenericNode:
             return message
         asked = self._codec.encode(request)
         decoded = interpreter.decode(asked, "request")
-        values = {**decoded.beside, **decoded.values}
-        settled = with_decided(plan.payload, {name: values[name] for name in plan.message.echoes})
+        values = {**decoded.beside, **decoded.values, request.ADDRESS: decoded.address}
+        command = next(each for each in interpreter.plan.commands if each.request.name == request.NAME)
+        repeated = command.repeated(plan.message).items()
+        told = {name: values[of] if isinstance(of, str) else of for name, of in repeated}
+        settled = with_decided(plan.payload, told)
         address = self.number if message.ADDRESS else None
         wire = interpreter.encode(message.NAME, settled, address, asked)
         (heard,) = filter(is_message, self._codec.StreamDecoder("response").feed(wire))
-        told = answer_to(self._codec)
-        return told(request, heard) if told else heard
+        make = answer_to(self._codec)
+        return make(request, heard) if make else heard
 
 
 def _sizes(command: Command, asked: Framed) -> dict[str, object]:

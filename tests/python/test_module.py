@@ -89,7 +89,7 @@ def test_the_transaction_table_matches_the_schema() -> None:
         assert row.response_byte_times == command.response_within.byte_times
         assert row.response_seconds == pytest.approx(float(command.response_within.seconds))
         assert (row.repeat_safe, row.repeat_counter) == (command.repeat.safe, command.repeat.counter)
-        assert row.echoes == command.echoes
+        assert row.echoes == command.repeated(command.response)
         assert (row.in_flight, row.section, row.confirmed) == (
             command.in_flight,
             command.section,

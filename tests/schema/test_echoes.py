@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import pytest
 
+from qlinkgen.model.protocol import Protocol
 from qlinkgen.schema import find, load, loads
 
 FRAME = """
@@ -21,6 +24,12 @@ bus: {kind: master_slave}
 """
 
 
+def repeated(protocol: Protocol) -> Mapping[str, str | int]:
+    """What the response of the first command repeats."""
+    command = protocol.commands[0]
+    return command.repeated(command.response)
+
+
 def faults(request: str, response: str) -> list[str]:
     """Faults for a field x of a request and an echo x in its response, except unused types."""
     text = (
@@ -30,11 +39,11 @@ def faults(request: str, response: str) -> list[str]:
 
 
 def test_qlink() -> None:
-    echoes = {each.name: each.echoes for each in load(find("qlink")).commands if each.echoes}
-    assert echoes == {
-        "node_program_load": ("counter",),
-        "motion": ("counter",),
-        "loop_back": ("offset", "data"),
+    commands = load(find("qlink")).commands
+    assert {each.name: each.repeated(each.response) for each in commands if each.echoes} == {
+        "node_program_load": {"counter": "counter"},
+        "motion": {"counter": "counter"},
+        "loop_back": {"offset": "offset", "data": "data"},
     }
 
 
@@ -100,7 +109,7 @@ def test_values_of_bit_fields_are_repeated() -> None:
     text = f"{FRAME}commands: {{go: {{id: 1, request: {{x: {{{BITS}}}}}, repeat: safe,"
     protocol, _ = loads(f"{text} response: {{x: {{{BITS}, echo: true}}}}}}}}", "x.yaml")
     assert protocol
-    assert protocol.commands[0].echoes == ("low", "high")
+    assert repeated(protocol) == {"low": "low", "high": "high"}
 
 
 def test_of_a_response_that_the_defaults_give() -> None:
@@ -108,7 +117,7 @@ def test_of_a_response_that_the_defaults_give() -> None:
     good = f"{text}commands: {{go: {{id: 1, request: {{x: u8}}}}}}"
     protocol, _ = loads(good, "x.yaml")
     assert protocol
-    assert protocol.commands[0].echoes == ("x",)
+    assert repeated(protocol) == {"x": "x"}
     found = [
         fault for fault in loads(good.replace("{x: u8}", "{y: u8}"), "x.yaml")[1] if fault.rule == "bad-echo"
     ]
@@ -117,3 +126,68 @@ def test_of_a_response_that_the_defaults_give() -> None:
 
 def test_nothing_is_concluded_from_a_request_that_is_wrong() -> None:
     assert faults("x: {type: u9}", "x: {type: u8, echo: true}") == ["u9 has 9 bits, not whole bytes"]
+
+
+PIECES = """
+qlinkgen: 1
+protocol: {name: sample, revision: "1", source: Made up for a test}
+frame:
+  parts:
+    start: B5
+    group: {role: message, type: u8}
+    head: {type: u8, bits: {node: {at: 0..3, role: address}, number: {at: 4..7, role: message}}}
+    tag: {type: u8, range: 1..9, default: 1}
+    length: {type: u8, counts: data}
+    data: {role: payload, size: 0..40}
+bus: {kind: master_slave, nodes: 1..8, broadcast: 0}
+defaults: {addressing: node, repeat: safe}
+replies:
+  nak: {id: {group: 5, number: 0}, fields: {whose: {type: u8, equals: request.group}, which: {type: u8, equals: request.number}}}
+messages:
+  ack: {id: {group: 5, number: 1}, direction: response, fields: {whose: {type: u8, equals: request.group}, from: {type: u8, equals: request.node}}}
+commands:
+  set: {id: {group: 6, number: 8}, request: {period: u16, of_first: u8}, response: ack}
+  get: {id: {group: 6, number: 9}, request: {first: u8}, response: {start: {type: u8, equals: request.first}, label: {type: u8, range: 1..10, equals: request.tag}}}
+"""  # noqa: E501
+
+
+def test_of_parts_of_the_frame_of_a_request() -> None:
+    protocol, found = loads(PIECES, "x.yaml")
+    assert protocol, found
+    commands = {each.name: each for each in protocol.commands}
+    for name, number in (("set", 8), ("get", 9)):
+        (nak,) = commands[name].replies
+        assert commands[name].repeated(nak.message) == {"whose": 6, "which": number}
+    assert commands["set"].repeated(commands["set"].response) == {"whose": 6, "from": "node"}
+    assert commands["get"].repeated(commands["get"].response) == {"start": "first", "label": "tag"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("equals: request.first", "equals: request.frist", "the request has no field 'frist' to repeat"),
+        ("{first: u8}", "{first: u8, group: u8}", "group of get.request is a field and a part of the frame"),
+        ("range: 1..10", "range: 1..8", "label cannot hold every tag of the request"),
+        (
+            "{type: u8, equals: request.node}",
+            "{type: u8, range: 1..7, equals: request.node}",
+            "from cannot hold node 0x8 of set.request",
+        ),
+        ("whose: {type: u8,", "whose: {type: u8, range: 7..9,", "whose cannot hold group 0x6 of get.request"),
+        (
+            "{type: u8, equals: request.group}",
+            "{type: 'u8[1]', equals: request.group}",
+            "whose cannot repeat group",
+        ),
+        (
+            "equals: request.first",
+            "equals: request.first, echo: true",
+            "start repeats two things",
+        ),
+        ("response: ack", "response: {}", "a message without a request has no request to repeat"),
+    ],
+)
+def test_of_what_it_cannot_be(old: str, new: str, said: str) -> None:
+    extra = PIECES.replace(old, new)
+    assert extra != PIECES
+    assert said in {fault.message for fault in loads(extra, "x.yaml")[1] if fault.severity == "error"}

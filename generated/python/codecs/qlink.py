@@ -2122,7 +2122,7 @@ COMMANDS: dict[str, Command] = {
         response_seconds=0.01,
         repeat_safe=True,
         repeat_counter="counter",
-        echoes=("counter",),
+        echoes={"counter": "counter"},
         section="7.6",
     ),
     "node_reset": Command(
@@ -2163,7 +2163,7 @@ COMMANDS: dict[str, Command] = {
         response_byte_times=3,
         repeat_safe=True,
         repeat_counter="counter",
-        echoes=("counter",),
+        echoes={"counter": "counter"},
         section="7.10",
     ),
     "motor_position": Command(
@@ -2253,7 +2253,7 @@ COMMANDS: dict[str, Command] = {
         addressing="node",
         response_byte_times=3,
         repeat_safe=True,
-        echoes=("offset", "data"),
+        echoes={"offset": "offset", "data": "data"},
         section="7.19",
     ),
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from qlinkgen.backends.c.echoes import of_reply, of_response
 from qlinkgen.backends.c.framing import Address, Expected, Function, expected
 from qlinkgen.backends.c.names import Names, count_type, unsigned
 from qlinkgen.backends.c.several import Listed, listed_in
@@ -39,7 +40,7 @@ class SlaveEntry:
         right: condition for a valid payload.
         unless_silent: term of a condition that prevents a response to a broadcast.
         replies: functions of other answers.
-        sizes: number of items of a field of the response, and the expression with which it begins.
+        initial: statements for the response, beyond its defaults, before the function is called.
         turn: its number in a dialogue, 0 if it begins a transaction; ``following`` is that of the next frame.
         listed: the nodes in it, each of which sends an answer; None if it has no list.
     """
@@ -58,7 +59,7 @@ class SlaveEntry:
     right: str
     unless_silent: str
     replies: list[str]
-    sizes: list[tuple[str, str]]
+    initial: list[str]
     turn: str
     following: str
     listed: Listed | None
@@ -72,6 +73,13 @@ class ReplyEntry:
     commands: list[str]
     function: str
     has_struct: bool
+    #: Statements for what it repeats of its request.
+    repeated: list[str]
+
+    @property
+    def needs_frame(self) -> bool:
+        """Whether they read the frame of the request."""
+        return any("frame->" in line for line in self.repeated)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,10 +156,13 @@ def slave_entries(
     kept: tuple[Message, ...],
     exchanges: Mapping[str, Exchange],
     *,
-    addressed: bool,
+    address: str,
     reject: str,
 ) -> list[SlaveEntry]:
-    """Requests to a slave, in schema order; ``reject`` is the function that rejects, "" if there is none."""
+    """Requests to a slave, in schema order.
+
+    ``address`` is the member with the address and ``reject`` the function that rejects, "" without one.
+    """
     present = {message.name for message in kept}
     entries = []
     for message in kept:
@@ -171,8 +182,9 @@ def slave_entries(
                     names,
                     message,
                     answer,
-                    addressing if addressed else "",
+                    addressing if address else "",
                     reject,
+                    address=address,
                     replies=replies,
                     exchange=exchange,
                 )
@@ -180,16 +192,26 @@ def slave_entries(
     return entries
 
 
-def reply_entries(names: Names, commands: tuple[Command, ...], kept: tuple[Message, ...]) -> list[ReplyEntry]:
-    """The other answers of a slave, each once."""
+def reply_entries(
+    names: Names, protocol: Protocol, commands: tuple[Command, ...], kept: tuple[Message, ...], address: str
+) -> list[ReplyEntry]:
+    """The other answers of a slave, each once; ``address`` is the member with the address."""
     present = {message.name for message in kept}
-    found: dict[str, ReplyEntry] = {}
+    found: dict[str, tuple[Message, list[Command]]] = {}
     for command in commands:
         for message in (reply.message for reply in command.replies):
             if message.name in present and command.request.name in present:
-                new = ReplyEntry(message.name, [], names.function(message), bool(message.values))
-                found.setdefault(message.name, new).commands.append(command.name)
-    return list(found.values())
+                found.setdefault(message.name, (message, []))[1].append(command)
+    return [
+        ReplyEntry(
+            name,
+            [command.name for command in those],
+            names.function(message),
+            bool(message.values),
+            of_reply(those, message, protocol.frame, address),
+        )
+        for name, (message, those) in found.items()
+    ]
 
 
 def _entry(
@@ -199,9 +221,11 @@ def _entry(
     addressing: str,
     reject: str,
     *,
+    address: str,
     replies: list[str],
     exchange: Exchange | None,
 ) -> SlaveEntry:
+    command = exchange.command if exchange else None
     following = exchange.following if exchange else None
     function, answer_constant = names.function(message), names.constant(answer) if answer else ""
     target = "&request, " if message.values else ""
@@ -222,7 +246,7 @@ def _entry(
         right=decoded if message.fields else "frame->size == 0U",
         unless_silent=" && !slave->broadcast" if answer and addressing == "either" else "",
         replies=replies,
-        sizes=_sizes(exchange.command if exchange else None, message, answer),
+        initial=_initial(command, message, answer, address) if command and answer else [],
         turn=turn_name(names, message) if exchange and exchange.turn else "",
         following=turn_name(names, following) if following else "",
         listed=_listed(exchange.command) if exchange and answer else None,
@@ -235,19 +259,20 @@ def _listed(command: Command) -> Listed | None:
     return listed_in(command.request, each, "request.") if each and not each.by else None
 
 
-def _sizes(command: Command | None, sent: Message, answer: Message | None) -> list[tuple[str, str]]:
-    """Members of the response, and those of the frame that it answers, in the type of the former.
+def _initial(command: Command, sent: Message, answer: Message, address: str) -> list[str]:
+    """Statements for what the response repeats, and for its numbers of items that ``sent`` says.
 
     In a dialogue, ``sent`` need not be the frame with the sizes, nor its first ``answer`` the response.
     """
-    if command is None or answer is None or (sent, answer) != (command.sized_by, command.response):
+    if answer is not command.response:
         return []
     fields = {field.name: field for field in answer.fields}
-    return [
-        (f"{name}_{fields[name].quantity}", f"({count_type(fields[name].most)})request.{member(asked)}")
-        for name, asked in command.sizes
+    sizes = [
+        f"response.{name}_{fields[name].quantity} = ({count_type(fields[name].most)})request.{member(asked)};"
+        for name, asked in (command.sizes if sent is command.sized_by else ())
         if not fields[name].fixed
     ]
+    return [*sizes, *of_response(command, sent, answer, address)]
 
 
 def turn_name(names: Names, message: Message) -> str:

@@ -285,12 +285,11 @@ class Header:
 
     def _slave(self) -> list[dispatch.SlaveEntry]:
         section = self._section
-        addressed = bool(section.view.address)
         found = dispatch.slave_entries(
             self._names,
             self._kept,
             self._protocol.exchanges,
-            addressed=addressed,
+            address=section.view.address,
             reject=section.reject,
         )
         return [dispatch.refusing(each, self._names.prefix) for each in found] if self._refuses else found
@@ -313,7 +312,10 @@ class Header:
     def _replies(self, slave: Sequence[dispatch.SlaveEntry]) -> list[dispatch.ReplyEntry]:
         """Functions that answer in another way, if any function of the slave may."""
         used = any(entry.replies for entry in slave)
-        return dispatch.reply_entries(self._names, self._plan.commands, self._kept) if used else []
+        if not used:
+            return []
+        commands, address = self._plan.commands, self._section.view.address
+        return dispatch.reply_entries(self._names, self._protocol, commands, self._kept, address)
 
     def _head(self) -> HeadView:
         protocol, runs, check = self._protocol, self._byte_runs(), self._section.check

@@ -693,7 +693,7 @@ class OtherReply:
         cases: first and last number of the field, and what they mean.
         within: byte times and seconds from the first pending reply to the answer, None: as for the response.
         after: byte times and seconds until the request is sent again.
-        echoes: fields that repeat the field of the same name in the request.
+        echoes: fields that repeat the request, and what: an attribute of it, or a number.
     """
 
     __slots__ = ("after", "cases", "echoes", "means", "message", "switch", "within")
@@ -707,7 +707,7 @@ class OtherReply:
         cases: tuple[tuple[int, int, str], ...] = (),
         within: tuple[float, float] | None = None,
         after: tuple[float, float] = (0, 0),
-        echoes: tuple[str, ...] = (),
+        echoes: Mapping[str, str | int] | None = None,
     ) -> None:
         self.message = message
         self.means = means
@@ -715,7 +715,7 @@ class OtherReply:
         self.cases = cases
         self.within = within
         self.after = after
-        self.echoes = echoes
+        self.echoes: Mapping[str, str | int] = echoes or {}
 
     def meaning(self, reply: Any) -> str:  # Any: a message of the class
         """What a reply means; the first case that has its number counts."""
@@ -743,7 +743,7 @@ class Command:
         response_seconds: ... plus seconds.
         repeat_safe: whether the request may be repeated after a missing response.
         repeat_counter: field that distinguishes a repeat from a new request, "" if there is none.
-        echoes: fields of the response that repeat the field of the same name in the request.
+        echoes: fields of the response that repeat the request, and what: an attribute of it, or a number.
         many: end of several answers, None if there is one.
         sizes: fields of the response, those of an earlier frame with their number of items, and the bits of
             an item if the count of bytes does not tell that number, otherwise 0.
@@ -776,7 +776,7 @@ class Command:
         response_seconds: float = 0,
         repeat_safe: bool = False,
         repeat_counter: str = "",
-        echoes: tuple[str, ...] = (),
+        echoes: Mapping[str, str | int] | None = None,
         many: Many | None = None,
         sizes: tuple[tuple[str, str, int], ...] = (),
         sized_by: MessageClass | None = None,
@@ -796,7 +796,7 @@ class Command:
         self.response_seconds = response_seconds
         self.repeat_safe = repeat_safe
         self.repeat_counter = repeat_counter
-        self.echoes = echoes
+        self.echoes: Mapping[str, str | int] = echoes or {}
         self.many = many
         self.sizes = sizes
         self.sized_by = sized_by or request

@@ -468,8 +468,8 @@ class BusModule:
             gets = f" Each `yield` gives the next frame: {frames}." if frames else ""
             text = f"A dialogue: a generator of the answers to each frame, the last of them returned.{gets}"
             doc += ["", *textwrap.wrap(text, WIDTH - 8)]
-        if command.echoes:
-            doc += ["", f"The response repeats {' and '.join(command.echoes)} of the request."]
+        if repeated := [of for of in command.repeated(command.response).values() if isinstance(of, str)]:
+            doc += ["", f"The response repeats {' and '.join(repeated)} of the request."]
         if command.response and command.addressing == "either":
             doc += ["", "Return None for a broadcast, which is not answered."]
         if _answers_once(command):

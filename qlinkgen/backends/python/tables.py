@@ -153,7 +153,11 @@ def _answers(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
     steps = [_step(each, kept[each.message.name]) for each in command.steps]
     if steps:
         arguments.append(f"steps={tuple_of(steps)}")
-    replies = [_reply(each, kept[each.message.name]) for each in command.meant if each.message.name in kept]
+    replies = [
+        _reply(each, command.repeated(each.message), kept[each.message.name])
+        for each in command.meant
+        if each.message.name in kept
+    ]
     if replies:
         arguments.append(f"replies={tuple_of(replies)}")
     return arguments
@@ -196,8 +200,8 @@ def _end(many: Many, kept: Mapping[str, MessagePlan]) -> str:
             assert_never(many)
 
 
-def _reply(reply: Reply, planned: MessagePlan) -> str:
-    """The call that creates a reply."""
+def _reply(reply: Reply, repeated: Mapping[str, str | int], planned: MessagePlan) -> str:
+    """The call that creates a reply, with what it repeats of the request."""
     arguments = [class_name(planned), f'"{reply.means}"']
     if reply.switch:
         cases = [f'({case.first}, {case.last}, "{case.means}")' for case in reply.cases]
@@ -206,8 +210,8 @@ def _reply(reply: Reply, planned: MessagePlan) -> str:
         arguments.append(f"within={_time(reply.within)}")
     if reply.after != Allowance():
         arguments.append(f"after={_time(reply.after)}")
-    if reply.echoes:
-        arguments.append(f"echoes={tuple_of([_quoted(attribute(name)) for name in reply.echoes])}")
+    if repeated:
+        arguments.append(f"echoes={_echoes(repeated)}")
     return f"OtherReply({', '.join(arguments)})"
 
 
@@ -215,8 +219,13 @@ def _time(time: Allowance) -> str:
     return f"({_number(time.byte_times)}, {_number(time.seconds)})"
 
 
-def _quoted(name: str) -> str:
-    return f'"{name}"'
+def _echoes(repeated: Mapping[str, str | int]) -> str:
+    """What the values of an answer repeat: an attribute of the request, or a number."""
+    pairs = (
+        f'"{attribute(name)}": ' + (str(of) if isinstance(of, int) else f'"{attribute(of)}"')
+        for name, of in repeated.items()
+    )
+    return f"{{{', '.join(pairs)}}}"
 
 
 def tuple_of(items: Sequence[str]) -> str:
@@ -226,11 +235,11 @@ def tuple_of(items: Sequence[str]) -> str:
 
 def _repetition(command: Command) -> list[str]:
     """Arguments on repetition and echoes."""
-    names = [_quoted(attribute(name)) for name in command.echoes]
+    repeated = command.repeated(command.response)
     facts = {
         "repeat_safe=True": command.repeat.safe,
         f'repeat_counter="{attribute(command.repeat.counter)}"': command.repeat.counter,
-        f"echoes={tuple_of(names)}" if names else "": names,
+        f"echoes={_echoes(repeated)}": repeated,
     }
     return [argument for argument, given in facts.items() if given]
 

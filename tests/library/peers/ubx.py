@@ -20,7 +20,8 @@ _KINDS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "set_message_rate.request": (
         "CFG-MSG",
         pairs(
-            "class=msgClass number=msgID i2c=rateDDC uart1=rateUART1 uart2=rateUART2 usb=rateUSB spi=rateSPI"
+            "message_class=msgClass message_number=msgID i2c=rateDDC uart1=rateUART1 uart2=rateUART2 "
+            "usb=rateUSB spi=rateSPI"
         ),
     ),
     "set_rate.request": ("CFG-RATE", pairs("period=measRate ratio=navRate reference=timeRef")),

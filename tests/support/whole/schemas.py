@@ -521,7 +521,23 @@ class _Maker:
         if plain and shape.kind != "packet" and self.rng.random() < 0.3:
             name = self.rng.choice(plain)
             echoes[name] = {"type": request[name], "echo": True}
+            if self.rng.random() < 0.5 and name not in str(shape.frame):
+                echoes = {self.words.name({name}): {"type": request[name], "equals": f"request.{name}"}}
+        if shape.kind != "packet" and self.rng.random() < 0.2:
+            self._repeat_part(shape, request, echoes)
         return maker.fields(Room.of(shape), echoes)
+
+    def _repeat_part(self, shape: Shape, request: Doc, echoes: Doc) -> None:
+        """Repeat a piece of the id of the request, or its address."""
+        parts = [] if shape.text_id else list(shape.pieces)
+        if shape.kind != "marked" and shape.address_bits:
+            parts.append((shape.address_name, shape.address_bits))
+        parts = [(name, bits) for name, bits in parts if name not in request and bits <= 64]
+        if parts:
+            name, bits = self.rng.choice(parts)
+            kind = f"u{self.rng.choice([each for each in (8, 16, 24, 32, 64) if each >= bits])}"
+            taken = {*shape.attributes, *echoes}
+            echoes[self.words.name(taken)] = {"type": kind, "equals": f"request.{name}"}
 
     def _message(self, shape: Shape, maker: FieldMaker, kinds: str, *, texts: bool = False) -> Doc:
         message: Doc = self._identified(shape)

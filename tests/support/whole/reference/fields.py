@@ -242,7 +242,7 @@ class Fields:
             return Slot(name, number, "count", str(spec["counts"]), unit, more=more, scale=scale)
         if "algorithm" in spec:
             return Slot(name, number, "filled", rule=spec, over=tuple(spec["over"]))
-        if "equals" in spec:
+        if "equals" in spec and "." not in spec["equals"]:
             source = re.sub(r"[-+] *\d+|[~ ]", "", spec["equals"])
             return Slot(name, number, "filled", rule=spec, over=(source,))
         number = _quantified(number, spec)
