@@ -57,7 +57,7 @@ def test_the_command_shows_both_messages(qlinkgen: Run) -> None:
     (position,) = [line for line in out.splitlines() if "position  " in line and "i32" in line]
     assert position.split()[:4] == ["2", "position", "4", "i32"]
     assert "encoder counts" in position
-    (counter,) = [line for line in out.splitlines() if line.endswith("echo")]
+    (counter,) = [line for line in out.splitlines() if line.endswith("= request.counter")]
     assert counter.split()[:2] == ["0", "counter"]
     assert "|  +-- running: The motor runs" in out
 

@@ -231,7 +231,7 @@ def long_form(given: Any) -> Doc:
         return {}
     is_long = given.keys() <= {"id", "fields", "means", "frame"} and (
         isinstance(given.get("fields"), dict)
-        or ("fields" not in given and re.match(r"\d|request|{'\w+': \d", str(given.get("id", ""))))
+        or ("fields" not in given and re.match(r"[^a-z{]|request|{'\w+': \d", str(given.get("id", ""))))
     )
     return dict(given) if is_long else {"fields": given}
 
