@@ -77,7 +77,7 @@ class IoImage:
         self._change = None
 
     def read_bytes(self, size: int, offset: int) -> bytes:
-        """Return bytes of the inputs, byte 0 first; 0 for missing ones (settled question 14)."""
+        """Return bytes of the inputs, byte 0 first; 0 for missing ones (docs/qlink.md, 14)."""
         return self._inputs.to_bytes(_BYTES, "little")[offset : offset + size].ljust(size, b"\0")
 
     def write_bytes(self, offset: int, data: bytes) -> None:

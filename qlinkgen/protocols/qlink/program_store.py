@@ -3,7 +3,7 @@
 Assumptions where the document is silent:
 
 * A request with counter 0 and no program data opens a load at any time, and restarts a running one.
-  So does an empty request (settled question 6); the codec does not distinguish them.
+  So does an empty request (docs/qlink.md, 6); the codec does not distinguish them.
 * A counter other than the next or that of the last piece is not acknowledged, nor is a piece before an
   opening: an acknowledged piece is a stored piece.
 * A piece with the counter of the last is a repeat: acknowledged without checking its data.

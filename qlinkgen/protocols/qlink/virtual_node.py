@@ -60,7 +60,7 @@ class VirtualNode(NodeState, SlaveHandlers):
     # Node (7.1 to 7.7) --------------------------------------------------------------------------------------
 
     def node_setup(self, request: qlink.NodeSetupRequest, now: float) -> qlink.NodeSetupResponse | None:
-        """Set number and settings; the answer has the new number (section 7.1, settled question 13)."""
+        """Set number and settings; answer with the new number (section 7.1; docs/qlink.md, 13)."""
         self.number = request.node_number
         self.t1_delay, self.t2_delay = request.t1_delay, request.t2_delay
         self.position_type = request.position_type
