@@ -51,9 +51,10 @@ def command(  # noqa: PLR0917  # click passes them by name
     """Ask every node of a Q.link bus for its identity, and print those that answer.
 
     Silent nodes are asked again after all others, and finally with loop_back: not every node supports
-    node_info. The time is that from request to response.
+    node_info. The time is that from request to response. A node is garbled if the bytes received are not an
+    answer: two nodes have its number, or the speed is wrong.
 
-    Exit code 1 if no node answers, or if the port is missing, busy or lost.
+    Exit code 1 if no node answers clearly, or if the port is missing, busy or lost.
 
     \b
     qlinkgen scan /dev/ttyUSB0
@@ -73,7 +74,7 @@ def command(  # noqa: PLR0917  # click passes them by name
         click.echo("\n".join(jsonlines.line(_record(each)) for each in found))
     else:
         _table(found).show()
-    return FINE
+    return WRONG if all(each.garbled for each in found) else FINE
 
 
 @contextlib.contextmanager
@@ -99,6 +100,7 @@ def _record(found: Found) -> dict[str, Json]:
         "t2_delay": None if info is None else info.t2_delay,
         "position_type": None if info is None else _position_type(info.position_type),
         "seconds": round(found.seconds, 6),
+        "garbled": found.garbled,
     }
 
 
@@ -117,7 +119,11 @@ def _table(found: list[Found]) -> Table:
     )
     for each in found:
         time, info = f"{each.seconds * 1000:.2f} ms", each.info
-        if info is None:
+        if each.garbled:
+            table.add(
+                each.node, None, None, None, None, "garbled: two nodes with this number, or a wrong --baud"
+            )
+        elif info is None:
             table.add(each.node, None, None, None, time, "does not support node_info")
         else:
             table.add(each.node, _version(info), info.product_id, info.serial_number, time, None)

@@ -80,6 +80,12 @@ IDLE, PROBING, WAITING, TURN = (
     _FAIL, _ABORT,
 ) = (Moves(MASTER_MOVES, event) for event in MasterEvent)  # fmt: skip
 
+#: Why a request failed whose answer was not a frame, and what usually causes it.
+NO_FRAME = (
+    "bytes were received that form no frame; two nodes may have answered at once, or speed, parity or wiring "
+    "are wrong"
+)
+
 
 class MasterEngine:
     """The master of one bus.
@@ -663,14 +669,14 @@ class MasterEngine:
             kinds = ", ".join(attempts.wrong_kinds())
             self._fail(BadReply, f"received only invalid replies ({kinds})", now)
         else:
-            self._fail(NoReply, "no answer", now)
+            self._fail(NoReply, NO_FRAME if self._received else "no answer", now)
 
     def _fail(self, error: type[LinkError], reason: str, now: float) -> None:
         pending, attempts = self._pending, self._attempts
         elapsed = now - attempts.started
         node = "" if pending.node is None else f" to node {pending.node}"
         times = "once" if attempts.number == 1 else f"{attempts.number} times"
-        received = attempts.wrong_bytes() or self._received
+        received = attempts.wrong_bytes() or self._received  # the latter are not a frame
         self._outcome = error(
             f"{pending.request.NAME}{node}: {reason}; sent {times}, {elapsed * 1e3:.1f} ms",
             node=pending.node,

@@ -40,9 +40,25 @@ def test_json_and_a_node_without_node_info(qlinkgen: Run, on_line: OnLine) -> No
         "t1_delay": 0.3,
         "t2_delay": 1.0,
         "position_type": 77,
+        "garbled": False,
     }
-    assert found[1] == {**dict.fromkeys(found[0]), "node": 5}
+    assert found[1] == {**dict.fromkeys(found[0]), "node": 5, "garbled": False}
     assert "does not support node_info" in qlinkgen("scan", port, "--nodes", "5").out
+
+
+def test_two_nodes_with_one_number_are_garbled(qlinkgen: Run, on_line: OnLine) -> None:
+    nodes = VirtualNode(3), VirtualNode(5, serial_number=1), VirtualNode(5, serial_number=2)
+    port = on_line(line(*nodes, baud=115200))
+    both = qlinkgen("scan", port, "--nodes", "3-6")
+    assert both.code == 0
+    rows = {row.split()[0]: row for row in both.out.splitlines() if row}
+    assert "garbled: two nodes with this number, or a wrong --baud" in rows["5"]
+    assert {"4", "6"}.isdisjoint(rows)
+    (only,) = objects(qlinkgen("scan", port, "--nodes", "5", "--json").out)
+    assert only["garbled"] is True
+    assert qlinkgen("scan", port, "--nodes", "5").code == 1
+    asked = qlinkgen("send", port, "qlink", "node_info", "--node", "5")
+    assert "bytes were received that form no frame; two nodes may have answered at once" in asked.err
 
 
 def test_nobody(qlinkgen: Run, on_line: OnLine) -> None:

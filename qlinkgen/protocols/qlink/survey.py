@@ -22,12 +22,14 @@ class Found:
     Attributes:
         node: its number, 1..16.
         info: its answer to node_info, None if it does not support that.
-        seconds: time from request to answer.
+        seconds: time from request to answer, or to the end of the wait.
+        garbled: bytes were received, but no answer: two nodes may have this number.
     """
 
     node: int
     info: qlink.NodeInfoResponse | None
     seconds: float
+    garbled: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,39 +55,48 @@ def scan(nodes: Iterable[int] = NODES) -> Procedure[list[Found]]:
     """Ask each node for its identity; reports each Found immediately.
 
     Most buses are not full, so each node is asked only once at first: silent nodes are asked again after all
-    others, and finally with loop_back, since not every node supports node_info.
+    others, and finally with loop_back, since not every node supports node_info. So are those whose answers
+    are garbled.
     """
     silent = list(nodes)
     found: list[Found] = []
+    garbled: dict[int, Found] = {}
     questions = (_who, _who, _loop)
     for question in questions:
         still: list[int] = []
         for node in silent:
             answer = yield from question(node)
-            if answer is None:
-                still.append(node)
-            else:
+            if answer is not None and not answer.garbled:
                 found.append(answer)
                 yield Tell(answer)
+                continue
+            still.append(node)
+            if answer is not None:
+                garbled[node] = answer
         silent = still
+    for node in silent:
+        if node in garbled:
+            found.append(garbled[node])
+            yield Tell(garbled[node])
     return sorted(found, key=lambda each: each.node)
 
 
 def _who(node: int) -> Procedure[Found | None]:
     reply = yield from _ask_once(qlink.NodeInfoRequest(node=node))
-    return None if reply is None else Found(node, reply.response, reply.response_time)
+    return Found(node, reply.response, reply.response_time) if isinstance(reply, Reply) else reply
 
 
 def _loop(node: int) -> Procedure[Found | None]:
     reply = yield from _ask_once(qlink.LoopBackRequest(node=node, data=_SIGN))
-    return None if reply is None else Found(node, None, reply.response_time)
+    return Found(node, None, reply.response_time) if isinstance(reply, Reply) else reply
 
 
-def _ask_once(request: qlink.Message) -> Procedure[Reply | None]:
+def _ask_once(request: qlink.NodeInfoRequest | qlink.LoopBackRequest) -> Procedure[Reply | Found | None]:
+    """Ask without repeats. Return the reply, what was garbled, or None for silence."""
     try:
         reply: Reply = yield Ask(request, attempts=1, trial=True)
-    except LinkError:
-        return None
+    except LinkError as error:
+        return Found(request.node, None, error.elapsed, garbled=True) if error.received else None
     return reply
 
 
