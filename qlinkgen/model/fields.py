@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, SupportsInt, assert_never
 
-from qlinkgen.model.condition import Condition, turning_points
+from qlinkgen.model.condition import Condition
+from qlinkgen.model.greatest import greatest
 from qlinkgen.model.texts import Text
 from qlinkgen.model.types import Array, BitField, Bits, Blob, Length, Scalar
 
@@ -240,16 +241,7 @@ class Value:
 
 def greatest_size(fields: Iterable[Field]) -> int:
     """The greatest size of fields on the wire, where some of them exclude each other."""
-    size, chosen = 0, dict[str, list[Field]]()
-    for each in fields:
-        if each.when:
-            chosen.setdefault(each.when[0].value, []).append(each)
-        else:
-            size += each.max_size
-    for group in chosen.values():
-        numbers = turning_points(each.when[0] for each in group)
-        size += max(sum(each.max_size for each in group if each.when[0].holds(raw)) for raw in numbers)
-    return size
+    return greatest((each.when, each.max_size) for each in fields)
 
 
 def separated_size(fields: Sequence[Field], *, leading: bool) -> tuple[int, int]:

@@ -64,6 +64,11 @@ class Presence:
     slot: str = ""
     case: str = ""
 
+    @property
+    def choosing(self) -> Test:
+        """The test that tells the cases of a choice apart; those before it are of the tested value."""
+        return self.when[-1]
+
 
 # Steps ------------------------------------------------------------------------------------------------------
 
@@ -627,9 +632,11 @@ def holders(steps: Iterable[Step]) -> tuple[Holder, ...]:
 
 
 def complete(cases: Iterable[Segment]) -> bool:
-    """Whether one of the cases of a choice applies to every number."""
-    tests = [test for each in cases if each.presence for test in each.presence.when]
-    return all(any(test.holds(raw) for test in tests) for raw in turning_points(tests))
+    """Whether one of the cases of a choice applies to every number, which is always there."""
+    presences = [each.presence for each in cases if each.presence]
+    tests = [each.choosing for each in presences]
+    always = all(len(each.when) == 1 for each in presences)
+    return always and all(any(test.holds(raw) for test in tests) for raw in turning_points(tests))
 
 
 def by_slot(each: Iterable[Holder]) -> tuple[tuple[Holder, ...], ...]:

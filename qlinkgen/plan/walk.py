@@ -77,7 +77,7 @@ def present(presence: Presence | None, numbers: Mapping[str, int], left: int) ->
         return True
     if presence.optional:
         return left > 0
-    return all(test.holds(numbers[test.value]) for test in presence.when)
+    return all(test.value in numbers and test.holds(numbers[test.value]) for test in presence.when)
 
 
 def of_values(plan: PayloadPlan, values: Mapping[str, T]) -> dict[str, tuple[Holder, T]]:
@@ -178,7 +178,10 @@ class Walk:
     @property
     def last(self) -> bool:
         """Whether the record ends its array."""
-        return bool(self._last) and all(test.holds(self.numbers[test.value]) for test in self._last)
+        numbers = self.numbers
+        return bool(self._last) and all(
+            test.value in numbers and test.holds(numbers[test.value]) for test in self._last
+        )
 
     def learn(self, step: Step, data: bytes, at: int) -> None:
         """Note the numbers of a step at ``at`` that later segments need. Raises Wrong for a wrong count."""

@@ -39,6 +39,7 @@ class ConditionBuilder:
         for field in fields:
             spec = self._specs[field.name]
             when = self._condition(field, spec.when or (), found)
+            self._check_possible(field, when)
             given = not spec.optional and self._holds(when, found)
             found.append(replace(field, when=when, optional=spec.optional, given=given))
         self._check_cases(found)
@@ -60,16 +61,27 @@ class ConditionBuilder:
     # Conditions
 
     def _condition(self, field: Field, texts: Sequence[TestText], before: Sequence[Field]) -> Condition:
-        return tuple(test for text in texts for test in self._test(field, text, before))
+        return tuple(dict.fromkeys(test for text in texts for test in self._test(field, text, before)))
 
     def _test(self, field: Field, text: TestText, before: Sequence[Field]) -> Iterator[Test]:
+        """The test of a value, after those that decide whether there is one."""
         value = self._tested(field, text, before)
         if value is None:
             return
         assert isinstance(value.type, Scalar)
         ranges = [self._range(field, each, value.type) for each in text.wanted]
         if None not in ranges:
+            yield from value.field.when
             yield Test(value.name, tuple(each for each in ranges if each), text.negated)
+
+    def _check_possible(self, field: Field, when: Condition) -> None:
+        """Check that no two tests exclude each other."""
+        for index, test in enumerate(when):
+            if any(exclusive((other,), (test,)) for other in when[:index]):
+                name = field.slot or field.name
+                what = f"{name} is never present: its conditions on {test.value} exclude each other"
+                key = "switch" if field.slot else "if"
+                self._error(field.name, key, what, "remove one of them; those of a tested field apply too")
 
     def _values(self, field: Field, before: Sequence[Field]) -> Mapping[str, Value]:
         """The values that a condition on a field may be about, by name."""
@@ -100,9 +112,10 @@ class ConditionBuilder:
             what = f"{text.field} cannot decide {what}"
             self._error(field.name, key, what, "name a whole number of up to 64 bits, an enum or a bool")
             return None
-        if value.field.conditional:
-            what = f"{text.field} may itself be absent"
-            self._error(field.name, key, what, "name a field that is always present")
+        if value.field.optional or value.field.slot:
+            why = "may be left out" if value.field.optional else "has several types"
+            what = f"{text.field} {why}"
+            self._error(field.name, key, what, "name a field that is always present, or has an if")
             return None
         return value
 
@@ -138,11 +151,11 @@ class ConditionBuilder:
                 if other is not None:
                     what = f"two cases of {slot} have values in common: {other.case} and {case.case}"
                     self._error(case.name, "if", what, "make them exclude each other")
-            tested = values.get(cases[0].when[0].value)
+            tested = values.get(cases[0].when[-1].value)
             assert isinstance(tested, Scalar)
             missing = self._unnamed(cases[0], tested)
             if missing is not None:
-                what = f"{slot} has no case for {missing}, which {cases[0].when[0].value} may be"
+                what = f"{slot} has no case for {missing}, which {cases[0].when[-1].value} may be"
                 hint = "add it, or default: bytes, or default: {} for no value"
                 self._error(cases[0].name, "cases", what, hint)
 

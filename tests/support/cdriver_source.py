@@ -376,14 +376,15 @@ def _guarded(message: Message | Layout, value: Value, owner: str, lines: list[st
     """The statements for a value; those of a case only where the tested number selects it."""
     if not value.field.slot:
         return lines
-    (test,) = value.field.when
-    kind = next(each.type for each in message.values if each.name == test.value)
-    cast, end = (
-        ("(long long)", "ll") if isinstance(kind, Scalar) and kind.signed else ("(unsigned long long)", "ull")
-    )
-    number = f"{cast}{owner}{naming.member(test.value)}"
-    ranges = [f"({number} >= {low}{end} && {number} <= {high}{end})" for low, high in test.ranges]
-    return [f"if ({'!' if test.negated else ''}({' || '.join(ranges)})) {{", *lines, "}"]
+    terms = []
+    for test in value.field.when:
+        kind = next(each.type for each in message.values if each.name == test.value)
+        signed = isinstance(kind, Scalar) and kind.signed
+        cast, end = ("(long long)", "ll") if signed else ("(unsigned long long)", "ull")
+        number = f"{cast}{owner}{naming.member(test.value)}"
+        ranges = [f"({number} >= {low}{end} && {number} <= {high}{end})" for low, high in test.ranges]
+        terms.append(f"{'!' if test.negated else ''}({' || '.join(ranges)})")
+    return [f"if ({' && '.join(terms)}) {{", *lines, "}"]
 
 
 def _member(value: Value) -> str:

@@ -66,7 +66,11 @@ class _Sizer:
 
     def _locals(self) -> list[str]:
         names = [each for each in self._numbers if each in self._tested]
-        lines = [f"{scalar_type(self._numbers[name])} {name}_raw;" for name in names]
+        absent = {each.name for each in holders(self._steps) if each.presence}
+        lines = [
+            f"{scalar_type(self._numbers[name])} {name}_raw{' = 0' if name in absent else ''};"
+            for name in names
+        ]
         counts = (step for step in self._steps if isinstance(step, CountStep))
         found = dict.fromkeys(f"{step.run}_{'bytes' if step.sized else 'count'}" for step in counts)
         return [*lines, *(f"size_t {name} = 0U;" for name in found)]

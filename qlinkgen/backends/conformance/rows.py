@@ -267,13 +267,15 @@ def _values(
 
 def _number(
     stated: Sequence[Value], payload: PayloadPlan, name: str, fields: JsonObject, raw: JsonObject
-) -> int:
-    """A raw number."""
+) -> int | None:
+    """A raw number, None if it is absent."""
     pairs = zip(stated, payload.settable, strict=True)
     value, step = next((value, step) for value, step in pairs if value.name == name)
     assert isinstance(step, ValueStep | Member)
-    given = raw.get(name)
-    return given if isinstance(given, int) else raw_number(name, step.number, _native(value, fields))
+    given, native = raw.get(name), _native(value, fields)
+    if isinstance(given, int) or native is None:
+        return given if isinstance(given, int) else None
+    return raw_number(name, step.number, native)
 
 
 def _always(value: Value) -> Value:

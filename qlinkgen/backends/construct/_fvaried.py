@@ -317,7 +317,8 @@ class Varied(Walked):
         for field in self.fields:
             bits = isinstance(field.subcon, BitFields)
             inner = field.subcon.fields if bits else [field]
-            if any(each.name in self.tested for each in inner):
+            tested = any(each.name in self.tested for each in inner)
+            if tested and self._present(field, numbers, 0):
                 self._note(field, super()._cell(field, values, path), numbers)
         cases = (each for each in self.fields if self.slots.get(each.name) == slot)
         return next((each for each in cases if self._present(each, numbers, 0)), None)
@@ -435,6 +436,7 @@ def _several(field: Renamed) -> Several | None:
 
 def _hold(tests: Sequence[Test], numbers: Mapping[str, int]) -> bool:
     return all(
-        any(low <= numbers[name] <= high for low, high in ranges) != excluded
+        name in numbers
+        and any(low <= numbers[name] <= high for low, high in ranges) != excluded
         for name, ranges, excluded in tests
     )

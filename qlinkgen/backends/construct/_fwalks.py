@@ -127,7 +127,8 @@ class Walked(Message):
         if not tests:
             return left > 0
         return all(
-            any(low <= numbers[name] <= high for low, high in ranges) != excluded
+            name in numbers
+            and any(low <= numbers[name] <= high for low, high in ranges) != excluded
             for name, ranges, excluded in tests
         )
 

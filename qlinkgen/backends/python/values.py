@@ -212,9 +212,9 @@ def rules(message: MessagePlan, place: Place, scales: Mapping[str, str]) -> list
 def _choice_rule(cases: Sequence[tuple[Presence, Call]], place: Place) -> Call:
     """The rule of a choice: that of the case which the tested value selects."""
     first = cases[0][0]
-    given = [f'"{attribute(first.slot)}"', f'"{attribute(first.when[0].value)}"']
+    given = [f'"{attribute(first.slot)}"', f'"{attribute(first.choosing.value)}"']
     for presence, rule in cases:
-        (test,) = presence.when
+        test = presence.choosing
         given.append(f"({test.ranges!r}, {test.negated}, {rule.flat})")
     return Call(place.use("ChoiceRule"), given)
 
@@ -346,7 +346,7 @@ def description(cases: Sequence[tuple[Value, Holder]], place: Place) -> str:
 def _case_text(each: Holder, place: Place) -> str:
     """What a choice is in one case."""
     assert each.presence is not None
-    where = "otherwise" if each.presence.when[0].negated else f"where {condition_text(each.presence)}"
+    where = "otherwise" if each.presence.choosing.negated else f"where {condition_text(each.presence)}"
     return f"{_facts(each, place) or 'a number'} {where}"
 
 

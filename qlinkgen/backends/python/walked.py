@@ -332,7 +332,7 @@ def _tested(cases: Sequence[Segment]) -> str:
     """The attribute that selects a case."""
     presence = cases[0].presence
     assert presence is not None
-    return attribute(presence.when[0].value)
+    return attribute(presence.choosing.value)
 
 
 def _python(test: Test) -> Test:

@@ -58,7 +58,8 @@ class _Measure:
         self._tested = {test.value for test in (*deciding(segments), *last)}
         self._known = set[tuple[str, bool]]()
         self._steps = [step for each in segments for step in each.steps]
-        lines: list[str] = []
+        absent = (each for each in holders(self._steps) if each.presence and each.name in self._tested)
+        lines = [f"{each.name}_raw = 0" for each in absent]
         for segment, cases in by_choice(segments):
             if segment.counted:
                 size = f"{segment.slot}_bytes"

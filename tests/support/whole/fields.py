@@ -187,6 +187,10 @@ class FieldMaker:
         if isinstance(made[first], dict) and rng.random() < 0.6:
             last = rng.choice(({more: False}, {bit: "0..3"}, {bit: 0, more: "not 1"}))
         test = f"{first}.{more}" if isinstance(made[first], dict) else first
+        if rng.random() < 0.3 and not self.shape.groups:
+            second = self.words.name(taken)
+            made[second] = {"type": "u8", "bits": {f"{second}_bit": 1}, "if": test}
+            size, test = size + 1, rng.choice((test, f"{second}.{second}_bit"))
         for _ in range(rng.choice((0, 1, 2, 3) if last else (1, 2, 3))):
             more_size, inside = self._varied_part(made, taken, test)
             size, depth = size + more_size, max(depth, 1 + inside)
@@ -196,7 +200,7 @@ class FieldMaker:
             size, depth = size + more_size, max(depth, 1 + inside)
         elif rng.random() < (1 if rests else 0.4):
             listed, room = list(made.items()), Room(0, 24, open_end=rests)
-            self._add_choice(listed, taken, room)
+            self._add_choice(listed, taken, room, when=rng.choice((None, None, test)))
             made, size = dict(listed), size + 24 - room.left
             inside = max((self._depth(each) for spec in made.values() for each in _cases_of(spec)), default=0)
             depth = max(depth, 1 + inside)
@@ -434,15 +438,20 @@ class FieldMaker:
             self._count(name, "items", 2, made, len(made), taken=taken, room=room)
         made.append((name, form))
 
-    def _add_choice(self, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
-        """A value whose type an earlier field decides, at the end of the payload."""
+    def _add_choice(
+        self, made: list[tuple[str, Any]], taken: set[str], room: Room, when: str | None = None
+    ) -> None:
+        """A value whose type an earlier field decides, at the end of the payload.
+
+        ``when`` is a condition on fields that are there, if that field is to be absent without it.
+        """
         rng = self.rng
         specs = [spec for _, spec in made if isinstance(spec, dict)]
         if any(self._is_open(each, made) for _, each in made) or any("optional" in each for each in specs):
             return
         if any("packed" in spec and not spec["type"].partition("[")[2][:-1].isdigit() for spec in specs):
             return
-        tag, size, ref, low, high = self._tag(taken)
+        tag, size, ref, low, high = self._tag(taken, when)
         room.left -= size
         cases: Doc = {}
         middle = (low + high) // 2
@@ -474,11 +483,11 @@ class FieldMaker:
             most = max(most, size)
         if not any(cases.values()) and not spec.get("default"):
             return
-        made.insert(rng.randint(0, len(made)), tag)
+        made.insert(rng.randint(0 if when is None else len(made), len(made)), tag)
         name = self.words.name(taken)
         if counted:
             count = self.words.name(taken)
-            of = rng.choice((name, [count, name], [tag[0], name, count]))
+            of = rng.choice((name, [count, name], [tag[0], name, count] if when is None else [name]))
             made.insert(rng.randint(0, len(made)), (count, {"type": "u16", "counts": of}))
             most += self._bytes_of("u16", {})
         made.append((name, spec))
@@ -491,8 +500,14 @@ class FieldMaker:
         kind = str(case["type"] if isinstance(case, dict) else case).partition("[")[0]
         return self.arrayed[kind].depth if kind in self.arrayed else 0
 
-    def _tag(self, taken: set[str]) -> tuple[tuple[str, Any], int, str, int, int]:
+    def _tag(self, taken: set[str], when: str | None) -> tuple[tuple[str, Any], int, str, int, int]:
         """A field that a choice may test: itself, its size, the reference, and its range."""
+        (name, spec), size, ref, low, high = self._plain_tag(taken)
+        if when is not None:
+            spec = {**({"type": spec} if isinstance(spec, str) else spec), "if": when}
+        return (name, spec), size, ref, low, high
+
+    def _plain_tag(self, taken: set[str]) -> tuple[tuple[str, Any], int, str, int, int]:
         rng, name = self.rng, self.words.name(taken)
         roll = rng.random()
         if roll < 0.3 and not self.shape.groups:
@@ -660,8 +675,12 @@ class FieldMaker:
                 continue
             counts = [each for each in order if specs[each].get("counts") == name]
             before = order[: min([order.index(each) for each in counts] + [at])]
+            sure = rng.random() < 0.7
             choices = [
-                each for other in before if "if" not in specs[other] for each in self._tests(other, specs)
+                each
+                for other in before
+                if "if" not in specs[other] or not sure
+                for each in self._tests(other, specs)
             ]
             if choices:
                 for each in (name, *counts):
@@ -703,7 +722,7 @@ class FieldMaker:
         if "bits" in spec:
             return [self._test(f"{name}.{bit}", *self._bit_limits(each)) for bit, each in spec["bits"].items()
                     if isinstance(each, int | str)]  # fmt: skip
-        if set(spec) - {"type", "byteorder", "default", "doc", "unit"} or "[" in kind:
+        if set(spec) - {"type", "byteorder", "default", "doc", "unit", "if"} or "[" in kind:
             return []
         if kind == "bool":
             return [self.rng.choice((name, {name: True}, {name: False}))]

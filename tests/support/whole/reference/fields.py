@@ -140,13 +140,15 @@ class Fields:
             else:
                 slot = self._slot(f"{name}@{index}", self._resolved(kind))
             if kind:
-                given = is_met(test, number.default)
-                found.append(replace(slot, when=(test,), given=given, choice=name))
+                when = _with_outer((test,), before)
+                defaults = {key: each.default for key, each in values_of(before) if isinstance(each, Number)}
+                given = all(is_met(each, defaults[each[0]]) for each in when)
+                found.append(replace(slot, when=when, given=given, choice=name))
         return found
 
     def _conditional(self, slot: Slot, spec: Doc, before: list[Slot]) -> Slot:
         """The slot with what decides whether it is present."""
-        tests = self.tests(spec.get("if", {}))
+        tests = _with_outer(self.tests(spec.get("if", {})), before)
         values, holds = dict(values_of(before)), True
         for name, ranges, excluded in tests:
             number = values[name]
@@ -366,6 +368,15 @@ class Fields:
 def _real(given: object) -> float:
     text = str(given)
     return float(text) if text in ("nan", "inf", "-inf") else float(exact(given))
+
+
+def _with_outer(tests: tuple[Test, ...], before: Sequence[Slot]) -> tuple[Test, ...]:
+    """Tests after those of the fields with the tested values: an absent one meets none."""
+    found: list[Test] = []
+    for test in tests:
+        holder = next(slot for slot in before if test[0] in (name for name, _ in slot.values()))
+        found += [each for each in (*holder.when, test) if each not in found]
+    return tuple(found)
 
 
 def _named_bits(flags: Doc) -> int:

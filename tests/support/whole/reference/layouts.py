@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import struct
 from collections.abc import Iterable, Iterator, Mapping
@@ -269,13 +270,36 @@ def most_bytes(slots: Iterable[Slot], along: Slot | None = None) -> int:
         kept = [slot for slot in kept if not slot.walked]
         return most_bytes(kept) + sum(slot.least_bytes for slot in walked if not slot.conditional)
     size = sum(slot.most_bytes for slot in kept if not slot.when)
-    for name in {slot.when[0][0] for slot in kept if slot.when}:
-        group = [slot for slot in kept if slot.when and slot.when[0][0] == name]
-        ends = [
-            end for slot in group for low, high in slot.when[0][1] for end in (low - 1, low, high, high + 1)
-        ]
-        size += max(sum(slot.most_bytes for slot in group if is_met(slot.when[0], end)) for end in ends)
+    left = [(slot.when, slot.most_bytes) for slot in kept if slot.when]
+    while left:
+        names, group = {test[0] for test in left[0][0]}, []
+        while more := [each for each in left if names & {test[0] for test in each[0]}]:
+            group += more
+            left = [each for each in left if each not in more]
+            names |= {test[0] for when, _ in more for test in when}
+        size += _most_of(group)
     return size
+
+
+def _most_of(group: list[tuple[tuple[Test, ...], int]]) -> int:
+    """The maximum size of what is present at once; of many values only the first tests count."""
+    names = sorted({test[0] for when, _ in group for test in when})
+    if len(names) > 4:
+        firsts = {when[0][0] for when, _ in group}
+        return sum(
+            _most_of([(when[:1], size) for when, size in group if when[0][0] == name]) for name in firsts
+        )
+    ends = [
+        sorted({end for when, _ in group for test in when if test[0] == name for low, high in test[1]
+                for end in (low - 1, low, high, high + 1)})
+        for name in names
+    ]  # fmt: skip
+    most = 0
+    for numbers in itertools.product(*ends):
+        given = dict(zip(names, numbers, strict=True))
+        present = (size for when, size in group if all(is_met(test, given[test[0]]) for test in when))
+        most = max(most, sum(present))
+    return most
 
 
 def is_met(test: Test, number: int) -> bool:

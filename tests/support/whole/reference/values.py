@@ -178,7 +178,7 @@ def _fields(slots: Sequence[Slot], values: Mapping[str, Raw]) -> bytes:
 def holds(slot: Slot, numbers: Mapping[str, int]) -> bool:
     """Whether the conditions of a field hold."""
     return all(
-        any(low <= numbers[name] <= high for low, high in ranges) != excluded
+        name in numbers and any(low <= numbers[name] <= high for low, high in ranges) != excluded
         for name, ranges, excluded in slot.when
     )
 
@@ -255,7 +255,7 @@ def meets(kind: Records, values: Mapping[str, Raw]) -> bool:
 def met(tests: Sequence[Test], numbers: Mapping[str, int]) -> bool:
     """Whether there are tests, and all hold."""
     return bool(tests) and all(
-        any(low <= numbers[name] <= high for low, high in ranges) != excluded
+        name in numbers and any(low <= numbers[name] <= high for low, high in ranges) != excluded
         for name, ranges, excluded in tests
     )
 
