@@ -60,7 +60,7 @@ from qlinkgen.link.gaps import Gap
 from qlinkgen.link.health import HealthBook, HealthPolicy
 from qlinkgen.link.many import Answers
 from qlinkgen.link.master_states import MASTER_MOVES, MasterEvent, MasterState
-from qlinkgen.link.numbering import for_master, master_of, numbering_of
+from qlinkgen.link.numbering import MasterNumber, numbering_of
 from qlinkgen.link.pending import Pending
 from qlinkgen.link.quiet import QuietLine
 from qlinkgen.link.state import Moves
@@ -99,6 +99,7 @@ class MasterEngine:
         counters: counts for each node, and under None those without a node.
         health: state of each node.
         numbering: the counter of its frames, None without one.
+        own: its number, where frames have a destination and a source.
     """
 
     def __init__(
@@ -110,8 +111,13 @@ class MasterEngine:
         health: HealthPolicy | None = None,
         accepts: Mapping[str, Accepts] | None = None,
         decoder: Decoder | None = None,
+        number: int | None = None,
     ) -> None:
-        """Make the master of a bus; a `PeerEngine` gives it a decoder."""
+        """Make the master of a bus; a `PeerEngine` gives it a decoder.
+
+        Its ``number`` is that of its requests where frames have a destination and a source, by default that
+        which the caller gives them.
+        """
         hooks = accepts or {}
         self.codec = codec
         self.timing = timing
@@ -129,7 +135,7 @@ class MasterEngine:
             self._decoder = AskedDecoder(codec, self._decoder, answers, self._asked)
         self._address = address_getter(codec)
         self.numbering = numbering_of(codec)
-        self._own = master_of(codec)
+        self.own = MasterNumber(codec, number)
         self._byte_time = timing.byte_time
         self._paced = timing.paced
         self._echo = EchoCanceller(echo)
@@ -201,8 +207,7 @@ class MasterEngine:
         if type(request) is Packet or (command := self._commands.get(type(request))) is None:
             raise TypeError(f"{type(request).__name__} is not a request of this protocol")
         tries = command.tries if attempts is None else self._tries_of(command, attempts)
-        if self.numbering is not None:
-            self.numbering.number(request)
+        self._fill(request)
         frame = self.codec.encode(request)
         node = self._address(request)
         dialogue = self._begun(command, request, further, node) if command.step_times or further else None
@@ -229,6 +234,12 @@ class MasterEngine:
             self._state = _START_PROBE[IDLE]
         else:
             self._state = _START[IDLE]
+
+    def _fill(self, message: Framed) -> None:
+        """Give a message of this master its number and that of the master."""
+        if self.numbering is not None:
+            self.numbering.number(message)
+        self.own.put(message)
 
     def _begun(
         self, command: CommandTiming, request: Framed, further: Sequence[Further], node: int | None
@@ -393,8 +404,7 @@ class MasterEngine:
         dialogue, pending = self._dialogue, self._pending
         assert dialogue is not None
         message = dialogue.next()
-        if self.numbering is not None:
-            self.numbering.number(message)
+        self._fill(message)
         frame = self.codec.encode(message)
         if type(message) is pending.command.definition.sized_by:
             pending.asked = message
@@ -454,7 +464,7 @@ class MasterEngine:
     def _take_in(self, event: Framed | Fault, now: float) -> None:
         if self._echo.broken and self._is_own(event):
             return
-        if self._own is not None and is_message(event) and not for_master(event, *self._own):
+        if is_message(event) and not self.own.takes(event):
             self._stray(event, now)
             return
         if (

@@ -67,13 +67,30 @@ def repeat(names: Sequence[str], request: Message, response: Message) -> None:
             setattr(response, name, getattr(request, name))
 
 
-def master_of(codec: Codec) -> tuple[str, int] | None:
-    """The attribute of answers with the number of their master, and that number; None if requests tell it."""
-    request = next((command.request for command in codec.COMMANDS.values()), None)
-    found: tuple[str, int] | None = getattr(request, "MASTER", None)
-    return found
+class MasterNumber:
+    """The number of a master among the values of its frames, if they have one.
 
+    Attributes:
+        number: its own number; None: requests have that of the caller.
+    """
 
-def for_master(message: Message, name: str, number: int) -> bool:
-    """Whether a message is for a master."""
-    return bool(getattr(message, name, number) == number)
+    def __init__(self, codec: Codec, number: int | None) -> None:
+        """``number`` is that of the master, None to leave it to the caller."""
+        self.number = number
+        request = next((command.request for command in codec.COMMANDS.values()), None)
+        found: tuple[str, int] | None = getattr(request, "MASTER", None)
+        self._name, self._usual = found or ("", 0)
+        #: Requests do not tell it.
+        self._alone = bool(self._name) and self._name not in repeated_of(codec)
+
+    def put(self, request: Message) -> None:
+        """Give a request the number, if its frame has one."""
+        if self.number is not None and self._name and self._name in getattr(request, "PARTS", ()):
+            setattr(request, self._name, self.number)
+
+    def takes(self, answer: Message) -> bool:
+        """Whether an answer is for this master; its request may tell that instead."""
+        if not self._alone:
+            return True
+        right = self._usual if self.number is None else self.number
+        return bool(getattr(answer, self._name, right) == right)

@@ -144,6 +144,8 @@ class PeerEngine:
         self, request: Question, now: float, *, attempts: int | None = None, trial: bool = False
     ) -> None:
         """Begin a transaction; see `MasterEngine.start`."""
+        if self.codec.BUS.first_node is not None:
+            self.master.own.number = self.slave.node.number
         self.master.start(request, now, attempts=attempts, trial=trial)
 
     def receive(self, data: bytes, now: float) -> None:

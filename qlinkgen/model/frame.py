@@ -235,6 +235,12 @@ class DelimitedFrame:
         """The directions whose frames differ; one of them where none do."""
         return get_args(Direction) if self.directed else ("response",)
 
+    @property
+    def alike(self) -> bool:
+        """Whether the frames of both directions have the same parts, whatever these hold."""
+        one, other = ([_outline(part) for part in self.towards(each).parts] for each in get_args(Direction))
+        return one == other
+
     def towards(self, direction: str) -> DelimitedFrame:
         """The frame of a direction, without the parts that only the other has."""
         if not self.directed:
@@ -382,6 +388,13 @@ class DelimitedFrame:
         over = [name for part in self.parts if part.checksum for name in part.checksum.over]
         found = (name.removeprefix(ATTRIBUTE) for name in over if name.startswith(ATTRIBUTE))
         return tuple(dict.fromkeys(found))
+
+
+def _outline(part: Part) -> Part:
+    """A part without what it holds."""
+    role: Role = part.role if part.role not in ("message", "address", "bits") else "bits"
+    kept = replace(part, role=role, bits=(), only=None, doc="", section="", confirmed=True)
+    return replace(kept, scalar=part.scalar and replace(part.scalar, default=0, minimum=0, maximum=0))
 
 
 def _stated(number: Scalar) -> Scalar | Blob:

@@ -1,8 +1,9 @@
 """Second pass, the destination and the source of frames.
 
-Between a master and its nodes, the one that is not the node is the master: in a request the destination is
+Where there are commands, the node answers, and the other one is the master: in a request the destination is
 the node, in a response the source. So each of both is two parts of the model, one for each direction, of
-which one has the address and the other the number of the master. On a link both are values of every frame.
+which one has the address and the other the number of the master. On a link without commands both are values
+of every frame.
 """
 
 from __future__ import annotations
@@ -47,6 +48,19 @@ class _Parties:
         self._addressed = any(bits.role == "address" for part in parts for bits in part.bits)
 
     @property
+    def _asks(self) -> bool:
+        """Whether a node answers a master; a link may have messages alone."""
+        return self._bus.kind != "link" or bool(self._commands)
+
+    @property
+    def _own(self) -> tuple[int, int, int]:
+        """The number of a master by default, and the least and the highest that it can have."""
+        if self._bus.kind != "link" or self._bus.nodes is None:
+            return self._bus.master or 0, 0, self._most
+        low, high = self._bus.nodes
+        return low if self._bus.master is None else self._bus.master, low, high
+
+    @property
     def _most(self) -> int:
         """The highest number that every party can have."""
         return min((1 << bits.bits) - 1 for _, bits in self._found.values())
@@ -57,7 +71,7 @@ class _Parties:
             return self._parts
         if self._is_wrong():
             return None
-        if self._bus.kind == "link":
+        if not self._asks:
             return tuple(_changed(part, self._in_range) for part in self._parts)
         if self._addressed:
             return tuple(_changed(part, self._master) for part in self._parts)
@@ -81,23 +95,34 @@ class _Parties:
         if self._bus.kind not in ("link", "master_slave"):
             hint = "use kind: master_slave or kind: link, or role: address"
             return place, f"a frame on a {self._bus.kind} has no {party}", hint
-        if self._bus.kind == "link" and self._commands:
-            what = f"the answer to {next(iter(self._commands))} would not be told by its {party}"
-            return place, what, "use kind: master_slave, or describe the messages of both ends"
-        if self._bus.kind == "link":
+        if not self._asks:
             return None
         if fault := self._split_fault():
             return fault
+        if self._bus.kind == "link":
+            return self._link_fault()
         if self._bus.master is None:
             what = f"{bits.name} is the number of the master in frames of one direction, but the bus has none"
             return ("bus",), what, "add master: 0, or another number"
         if self._bus.master > self._most:
             what = f"master {self._bus.master} does not fit {listed(self._found)}"
             return ("bus", "master"), what, f"use 0..{self._most}"
+        return self._type_fault()
+
+    def _type_fault(self) -> tuple[Path, str, str] | None:
         if len({_container(of.bits) for _, of in self._found.values()}) > 1:
+            part, bits = next(iter(self._found.values()))
             what = f"{listed(self._found)} have different types"
-            return place, what, "give both the same type"
+            return self._place(part, bits), what, "give both the same type"
         return None
+
+    def _link_fault(self) -> tuple[Path, str, str] | None:
+        """Each end of a link may ask, so the number of a master is one of the nodes."""
+        master, nodes = self._bus.master, self._bus.nodes
+        if master is not None and nodes is not None and not nodes[0] <= master <= nodes[1]:
+            what = f"master {master} is not one of the nodes"
+            return ("bus", "master"), what, f"use {nodes[0]}..{nodes[1]}"
+        return self._type_fault()
 
     def _split_fault(self) -> tuple[Path, str, str] | None:
         """What keeps the node and the master from being told apart."""
@@ -142,7 +167,8 @@ class _Parties:
         """The number of the master."""
         assert bits.type is not None
         # Both directions have one value, and so one range.
-        number = replace(bits.type, default=self._bus.master or 0, maximum=self._most)
+        default, low, high = self._own
+        number = replace(bits.type, default=default, minimum=low, maximum=high)
         return replace(bits, type=number, party="master", doc=bits.doc or "Number of the master")
 
     def _in_range(self, bits: PartBits) -> PartBits:

@@ -352,8 +352,8 @@ _ALL = (
         "bad-party",
         "The destination and the source of frames tell the node from the master.",
         "In a request the node is the destination, in a response the source; the other one is the master, "
-        "whose number is `master` of the bus. On a link both are values of every frame. Elsewhere a frame "
-        "has both, or an address and the one that is the master.",
+        "whose number is `master` of the bus. A frame has both, or an address and the one that is the "
+        "master. On a link without commands both are values of every frame.",
     ),
     Rule(
         "address-does-not-fit",

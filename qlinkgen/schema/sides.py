@@ -109,6 +109,6 @@ def _obstacle(file: SchemaFile, frame: Frame, messages: Sequence[Message]) -> st
         return "a check value depends on the message"
     if file.to_unknown:
         return "an answer is like any unknown request, to which a reply is stated"
-    if any(part.only for part in frame.parts):
+    if not frame.alike:
         return "a part is only in the frames of one direction"
     return ""

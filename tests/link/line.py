@@ -157,11 +157,10 @@ class Node:
 
 
 class Setter:
-    """Node 3 of a made-up protocol: it answers each request with the response of `set`."""
+    """A node of a made-up protocol: it answers each request with the response of `set`."""
 
-    number = 3
-
-    def __init__(self, module: Any) -> None:
+    def __init__(self, module: Any, number: int = 3) -> None:
+        self.number = number
         self._response = module.SetResponse
 
     def handle(self, request: Any, now: float) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from qlinkgen.backends import python
-from qlinkgen.link import MasterEngine, SlaveEngine, Timing
+from qlinkgen.link import MasterEngine, PeerEngine, SlaveEngine, Timing
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.schema.loader import loads
@@ -84,3 +84,52 @@ def test_a_link_has_both_as_values() -> None:
     frame = codec.encode("set", {"destination": 15, "source": 7})
     assert frame[2] == 0x7F
     assert codec.decode(frame, "request").beside == {"destination": 15, "source": 7}
+
+
+ASKING = "id: 5, from: either,"
+LINK = SCHEMA.replace("master_slave", "link").replace(" master: 9,", "").replace("id: 5,", ASKING)
+WAY = "way: {role: direction, type: u8, values: {request: 1, response: 0}}"
+
+
+def test_the_ends_of_a_link_ask_each_other() -> None:
+    text = LINK.format(parts=f"{BITS}\n    {WAY}")
+    protocol, faults = loads(text, "sample")
+    assert protocol is not None, [str(fault) for fault in faults]
+    module: Any = python.load(protocol)
+    assert module.SetRequest(node=3, value=1).master == 1
+    timing = Timing.of(module, host_slack=0.05)
+    ends = [PeerEngine(module, timing, Setter(module, number)) for number in (2, 5)]
+    for engine, other in zip(ends, (5, 2), strict=True):
+        engine.start(module.SetRequest(node=other, value=other), 0.0)
+    asked = [engine.bytes_to_send(0.0) for engine in ends]
+    assert [frame[2] for frame in asked] == [0x25, 0x52]
+    stray = module.SetResponse(node=5, master=7).to_frame()
+    ends[0].receive(asked[1] + stray, 0.02)
+    ends[1].receive(asked[0], 0.02)
+    answers = [engine.bytes_to_send(0.03) for engine in ends]
+    assert [frame[2] for frame in answers] == [0x25, 0x52]
+    assert ends[0].busy
+    for engine, frame in zip(ends, reversed(answers), strict=True):
+        engine.receive(frame, 0.04)
+    replies = [engine.take().response for engine in ends]
+    assert [(each.node, each.master) for each in replies] == [(5, 2), (2, 5)]
+    assert [engine.total.strays for engine in ends] == [1, 0]
+
+
+def test_a_master_has_a_number_of_its_own() -> None:
+    module = made(BITS)
+    engine = MasterEngine(module, Timing.of(module, host_slack=0.05), number=4)
+    answers = [(0.03, module.SetResponse(node=3, master=number).to_frame()) for number in (9, 4)]
+    run = drive(engine, module.SetRequest(node=3, value=1), answers, 0.0)
+    assert run.frames[0][2] == 0x43
+    assert run.response.master == 4
+
+
+def test_messages_of_a_link_that_asks_have_a_direction() -> None:
+    text = LINK.format(parts=BITS).replace("    code:", f"    {WAY}\n    code:")
+    _, faults = loads(text + "messages: {event: {id: 6, fields: {}}}\n", "sample")
+    assert "event has no direction, which its frame states" in str(faults[0])
+    protocol, faults = loads(text + "messages: {event: {id: 6, direction: request, fields: {}}}\n", "sample")
+    assert protocol is not None, faults
+    frame = Codec(plan_of(protocol)).encode("event", {"master": 7}, 5)
+    assert frame[2] == 0x75

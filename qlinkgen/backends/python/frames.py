@@ -246,9 +246,9 @@ def _counter(plan: Plan) -> str:
 
 
 def _master(plan: Plan) -> str:
-    """The number of the master where only answers have it, as a tuple; "" elsewhere."""
+    """The attribute with the number of the master, and its default, as a tuple; "" if there is none."""
     found = plan.protocol.master
-    if found is None or found.name in plan.protocol.repeated:
+    if found is None:
         return ""
     assert found.type is not None
     return f'("{attribute(found.name)}", {found.type.default})'

@@ -13,18 +13,20 @@ from tests.library.protocols import Record
 
 #: Message to its function, and whether a primary station sends it.
 _KINDS: Mapping[str, tuple[int, bool]] = {
-    "reset_link": (0, True), "test_link": (2, True), "confirmed_data": (3, True),
-    "unconfirmed_data": (4, True), "request_status": (9, True), "ack": (0, False), "nack": (1, False),
-    "status": (11, False), "not_supported": (15, False),
+    "reset_link.request": (0, True), "test_link.request": (2, True), "confirmed_data.request": (3, True),
+    "unconfirmed_data.request": (4, True), "request_status.request": (9, True), "ack": (0, False),
+    "nack": (1, False), "request_status.response": (11, False), "not_supported": (15, False),
 }  # fmt: skip
 UNKNOWN: frozenset[str] = frozenset()
 
 
 def build(record: Record) -> bytes | None:
     function, primary = _KINDS[record["message"]]
-    control = ControlByte(record["master"], primary, record["count"], record["valid"], function)
+    control = ControlByte(record["from_master"], primary, record["count"], record["valid"], function)
     data = bytes.fromhex(record["fields"].get("data", ""))
-    return bytes(DataLinkFrame.build(record["destination"], record["source_"], control, data).to_bytes())
+    ends = (record["node"], record["master"])
+    destination, source = ends if primary else reversed(ends)
+    return bytes(DataLinkFrame.build(destination, source, control, data).to_bytes())
 
 
 def read(wire: bytes, direction: Direction) -> Record | None:
@@ -34,9 +36,9 @@ def read(wire: bytes, direction: Direction) -> Record | None:
     name = next(name for name, each in _KINDS.items() if each == kind)
     return {
         "message": name,
-        "destination": header.destination,
-        "source_": header.source,
-        "master": control.dir_from_master,
+        "node": header.destination if control.prm else header.source,
+        "master": header.source if control.prm else header.destination,
+        "from_master": control.dir_from_master,
         "count": control.fcb,
         "valid": control.fcv,
         "fields": {"data": frame.user_data.hex()} if frame.user_data else {},

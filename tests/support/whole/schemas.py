@@ -12,6 +12,7 @@ from tests.support.whole import frames, kinds, words
 from tests.support.whole.fields import FieldMaker, Room
 from tests.support.whole.frames import Shape
 from tests.support.whole.kinds import Kinds
+from tests.support.whole.reference.notation import whole_span
 
 Doc = dict[str, Any]
 _PLAIN = re.compile(r"[a-z][a-z0-9_]*\Z", re.ASCII)
@@ -103,7 +104,9 @@ class _Maker:
             kinds.lead_with_ids(random.Random(f"ids {self.seed}"), several)
         else:
             document |= self._traffic(shape, maker, document["bus"])
-        if shape.bus == "master_slave" and shape.master is None and self.seed % _LINK == 1:
+        parties = shape.master is not None
+        asks = not parties or bool(document.get("commands"))
+        if shape.bus == "master_slave" and asks and self.seed % (3 if parties else _LINK) == 1:
             _link(rng, document)
         maker.forget_unused(document)
         if not several:
@@ -609,7 +612,11 @@ def _lists(spec: object) -> bool:
 
 def _link(rng: random.Random, document: Doc) -> None:
     """Let the bus be a link, whose sides the directed messages name."""
-    document["bus"] |= {"kind": "link", "sides": ["host", "device"]}
+    bus = document["bus"]
+    bus |= {"kind": "link", "sides": ["host", "device"]}
+    low, high = whole_span(bus.get("nodes", "0..0"))
+    if not low <= int(bus.get("master", low)) <= high:
+        del bus["master"]
     for spec in document.get("messages", {}).values():
         if "direction" in spec:
             spec["from"] = {"request": "host", "response": "device"}[spec.pop("direction")]

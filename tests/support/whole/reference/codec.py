@@ -12,7 +12,7 @@ from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.kinds import Kinds, address_of
 from tests.support.whole.reference.layouts import Message
 from tests.support.whole.reference.notation import Direction, Doc, load, part_doc, whole_span
-from tests.support.whole.reference.parties import has_parties
+from tests.support.whole.reference.parties import asks, has_parties
 from tests.support.whole.reference.receivers import (
     Event,
     Hunter,
@@ -85,7 +85,7 @@ class Reference:
             if role == "address"
         ]
         self.address_name = addressed[0] if addressed else "address" if "marked" in shape else None
-        if has_parties(data) and not addressed and data["bus"]["kind"] == "master_slave":
+        if has_parties(data) and not addressed and asks(data):
             self.address_name = "node"
         self.messages = document.messages(data, Fields(data, most), self.address_name is not None)
         for frame in (self.frame, self.requests):

@@ -16,6 +16,11 @@ def has_parties(document: Doc) -> bool:
     return any(inner.get("role") in _OF_MASTER for spec in specs for inner in _roles(spec))
 
 
+def asks(document: Doc) -> bool:
+    """Whether nodes answer masters; a link may have messages alone."""
+    return document["bus"]["kind"] != "link" or bool(document.get("commands"))
+
+
 def most(document: Doc) -> int:
     """The highest number that every party of frames can have."""
     specs = [part_doc(each) for each in document["frame"]["parts"].values()]
@@ -29,7 +34,7 @@ def most(document: Doc) -> int:
 
 def told(given: object, direction: str, document: Doc) -> object:
     """A part as it is in a direction: with an address, or with the number of the master as a value."""
-    bus = {**document["bus"], "most": most(document)}
+    bus = {**document["bus"], "most": most(document), "silent": not asks(document)}
     spec = part_doc(given)
     if not any(inner.get("role") in _OF_MASTER for inner in _roles(spec)):
         return given
@@ -39,7 +44,7 @@ def told(given: object, direction: str, document: Doc) -> object:
             "bits": dict(_bits(name, each, direction, bus) for name, each in spec["bits"].items()),
         }
     whole = {key: value for key, value in spec.items() if key not in ("role", "if")}
-    if bus["kind"] == "link":
+    if bus["silent"]:
         return {**whole, "role": "value", **_in_range(spec["role"], bus)}
     if "if" in spec:
         return {**whole, "role": "value", **_master(bus)}
@@ -53,7 +58,7 @@ def _bits(name: str, given: Any, direction: str, bus: Doc) -> tuple[str, Any]:
     """Bits of a part and their name, as they are in a direction."""
     if not isinstance(given, dict) or given.get("role") not in _OF_MASTER:
         return name, given
-    if bus["kind"] == "link":
+    if bus["silent"]:
         return name, {"at": given["at"], **_in_range(given["role"], bus)}
     if _OF_MASTER[given["role"]] == direction:
         return "master", {"at": given["at"], "type": _number(given["at"]), **_master(bus)}
@@ -61,6 +66,9 @@ def _bits(name: str, given: Any, direction: str, bus: Doc) -> tuple[str, Any]:
 
 
 def _master(bus: Doc) -> Doc:
+    if bus["kind"] == "link":
+        low, high = whole_span(bus["nodes"])
+        return {"range": f"{low}..{high}", "default": bus.get("master", low)}
     return {"range": f"0..{bus['most']}", "default": bus["master"]}
 
 
