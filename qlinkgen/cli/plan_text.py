@@ -74,8 +74,9 @@ def _covered(frame: FramePlan, envelope: Envelope, part: Part) -> str:
     """Return the check values that cover a part; "yes" if there is only one."""
     if frame.needs_request and frame.check is not None:
         return "" if isinstance(part, CheckPart) else "yes"
-    names = [each.name for each in envelope.checks if part.name in each.check.over]
-    return ", ".join(names) if len(envelope.checks) > 1 else "yes" if names else ""
+    checks = (*envelope.checks, *envelope.conditional_checks)
+    names = [each.name for each in checks if part.name in each.check.over]
+    return ", ".join(names) if len(checks) > 1 else "yes" if names else ""
 
 
 def show_frame_plan(plan: Plan) -> None:

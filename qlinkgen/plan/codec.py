@@ -183,7 +183,7 @@ class Codec:
         """
         frame = frame or message.frame_for(len(cells[message.envelope.payload.name]))
         envelope, transparency = message.envelope_in(frame), frame.transparency
-        for part in envelope.filling:
+        for part in (*envelope.filling, *envelope.conditional_checks):
             if part.name not in cells:
                 value = self.check_value(part, envelope, cells, request)
                 cells = {**cells, part.name: part.check.pack(value)}
@@ -245,8 +245,8 @@ class Codec:
         message = self.plan.known(direction).get(-1 if taken.number is None else taken.number)
         frame = taken.frame or self.plan.frames[direction]
         envelope = message.envelope_in(frame) if message else frame.envelope
-        for part in envelope.checks:
-            if part not in envelope.seeded:
+        for part in (*envelope.checks, *envelope.conditional_checks):
+            if part not in envelope.seeded and not envelope.absent(part, taken.cells):
                 self._verify(part, envelope, taken, taken.cells, request)
         if envelope.blocks and taken.cells[envelope.blocks.name] != envelope.blocks.values(taken.payload):
             raise BadFrame("crc", taken.end)

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import assert_never
 
 from qlinkgen.model.condition import Condition, Test
-from qlinkgen.plan.parts import CellPart, LengthPart, Part
+from qlinkgen.plan.parts import CellPart, CheckPart, ConstantPart, LengthPart, Part
 from qlinkgen.plan.payload import Member
+
+#: A part that only some frames have.
+ConditionalPart = CellPart | LengthPart | ConstantPart | CheckPart
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,15 +40,16 @@ class Selector:
 class Conditional:
     """Adjacent parts, which a frame has where values of its header meet a condition.
 
-    They hold values, of which a frame without them has the defaults; or a length, if the first hands over.
+    They hold values, of which a frame without them has the defaults; or a length, if the first hands over. At
+    the end of a frame there are constants and check values, too.
 
     Attributes:
-        parts: the integers with the values, or with the length.
+        parts: the integers with the values, or with the length; constants and check values.
         selectors: conditions that all hold.
         tests: the same on the values by name.
     """
 
-    parts: tuple[CellPart | LengthPart, ...]
+    parts: tuple[ConditionalPart, ...]
     selectors: tuple[Selector, ...]
     tests: Condition
 
@@ -65,10 +70,14 @@ class Conditional:
         return next((part for part in self.parts if isinstance(part, LengthPart)), None)
 
     @property
+    def checks(self) -> tuple[CheckPart, ...]:
+        """The check values among them."""
+        return tuple(part for part in self.parts if isinstance(part, CheckPart))
+
+    @property
     def packed(self) -> tuple[bytes, ...]:
-        """The bytes of each part with the defaults of its values."""
-        numbers = ((part, part.initial if isinstance(part, CellPart) else 0) for part in self.parts)
-        return tuple(part.integer.pack(number) for part, number in numbers)
+        """The bytes of each part with the defaults of its values; zeros for a length or a check value."""
+        return tuple(map(_packed, self.parts))
 
     @property
     def initial(self) -> bytes:
@@ -82,16 +91,30 @@ class Conditional:
 
 def conditional(parts: Iterable[Part], conditions: Mapping[str, Condition]) -> Conditional | None:
     """Those of these parts that have a condition, which is the same for all; None without any."""
-    cells = [part for part in parts if isinstance(part, CellPart | LengthPart)]
-    found = tuple(part for part in cells if part.name in conditions)
+    able = [part for part in parts if isinstance(part, ConditionalPart)]
+    found = tuple(part for part in able if part.name in conditions)
     if not found:
         return None
     tests = conditions[found[0].name]
     held = dict[str, tuple[CellPart | LengthPart, Member | None]]()
-    for part in cells:
+    for part in able:
+        if isinstance(part, ConstantPart | CheckPart):
+            continue
         held[part.name] = part, None
         held |= {member.name: (part, member) for member in part.values} if isinstance(part, CellPart) else {}
     return Conditional(found, tuple(_selector(*held[test.value], test) for test in tests), tests)
+
+
+def _packed(part: ConditionalPart) -> bytes:
+    match part:
+        case CellPart():
+            return part.integer.pack(part.initial)
+        case ConstantPart():
+            return part.data
+        case LengthPart() | CheckPart():
+            return bytes(part.size)
+        case _:
+            assert_never(part)
 
 
 def _selector(part: CellPart | LengthPart, member: Member | None, test: Test) -> Selector:

@@ -438,7 +438,7 @@ def part_text(part: Part, frame: FramePlan) -> str:  # noqa: C901  # a case a pa
     """The content of a part of a frame."""
     match part:
         case ConstantPart():
-            return part.data.hex(" ").upper()
+            return part.data.hex(" ").upper() + _held_text(part, frame)
         case LengthPart():
             more = f"; {part.otherwise} for more" if part.otherwise is not None else ""
             counted = _counted("payload bytes", part.bias, part.scale)
@@ -452,8 +452,7 @@ def part_text(part: Part, frame: FramePlan) -> str:  # noqa: C901  # a case a pa
             return f"0x{part.marker:02X}, {part.address_name}, {what}"
         case CellPart():
             slots = "; ".join(f"bits {_slot_text(part, slot)}" for slot in part.slots)
-            held = (each for each in frame.envelope.conditional if part in each.parts)
-            return slots + "".join(f"; {_if_text(each.tests)}" for each in held)
+            return slots + _held_text(part, frame)
         case EqualPart():
             added = f" {part.added:+d}".replace("+", "+ ").replace("-", "- ") if part.added else ""
             return f"{'complement of ' if part.inverted else ''}{part.of.name}{added}"
@@ -462,12 +461,18 @@ def part_text(part: Part, frame: FramePlan) -> str:  # noqa: C901  # a case a pa
             kept += f", at least {part.trim}" if part.trim else ""
             return f"the message's fields{kept}"
         case CheckPart():
-            text = check_text(part.check, frame)
+            text = check_text(part.check, frame) + _held_text(part, frame)
             return text if part.check.complete else f"{text}; bits {_sent_bits_text(part.check)} are sent"
         case BlocksPart():
             return f"{check_text(part.check, frame)}, after every {part.every} bytes and after the rest"
         case _:
             assert_never(part)
+
+
+def _held_text(part: Part, frame: FramePlan) -> str:
+    """The condition of a part that only some frames have, "" if each has it."""
+    held = (each for each in frame.envelope.conditional if part in each.parts)
+    return "".join(f"; {_if_text(each.tests)}" for each in held)
 
 
 def _slot_text(part: CellPart, slot: Slot) -> str:

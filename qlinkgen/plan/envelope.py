@@ -136,8 +136,14 @@ class Envelope:
 
     @cached_property
     def checks(self) -> tuple[CheckPart, ...]:
-        """The check values in wire order."""
-        return tuple(part for part in self.parts if isinstance(part, CheckPart))
+        """The check values that each frame has, in wire order."""
+        held = self.conditional_checks
+        return tuple(part for part in self.parts if isinstance(part, CheckPart) and part not in held)
+
+    @property
+    def conditional_checks(self) -> tuple[CheckPart, ...]:
+        """The check values that only some frames have; they cover no others."""
+        return self.after.checks if self.after else ()
 
     @cached_property
     def check(self) -> CheckPart | None:
@@ -154,6 +160,7 @@ class Envelope:
     def algorithms(self) -> tuple[Check, ...]:
         """The check values, the main one first, each algorithm perhaps several times."""
         checks = [part.check for part in sorted(self.checks, key=lambda part: part is not self.check)]
+        checks += [part.check for part in self.conditional_checks]
         return tuple(checks + ([self.blocks.check] if self.blocks else []))
 
     @cached_property

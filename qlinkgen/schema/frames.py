@@ -57,9 +57,18 @@ def with_payload(specs: Mapping[str, PartSpec]) -> Mapping[str, PartSpec]:
     return {**{each: specs[each] for each in names[:at]}, name: payload, **{e: specs[e] for e in names[at:]}}
 
 
+def _depends(spec: PartSpec) -> bool:
+    """Whether only some frames of a direction have a part."""
+    return any(test.field != "direction" for test in spec.when or ())
+
+
 def _main_check(specs: Mapping[str, PartSpec]) -> str:
     """The check value whose algorithm can be replaced: the last over the payload, else the last."""
-    checks = [name for name, spec in specs.items() if spec.told == "checksum" and not spec.every]
+    checks = [
+        name
+        for name, spec in specs.items()
+        if spec.told == "checksum" and not spec.every and not _depends(spec)
+    ]
     payload = next((name for name, spec in specs.items() if spec.told == "payload"), "")
     over = [name for name in checks if payload in (specs[name].over or ())]
     return (over or checks or [""])[-1]

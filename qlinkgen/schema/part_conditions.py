@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from qlinkgen.model.condition import Test
 from qlinkgen.model.fields import Field, Value
-from qlinkgen.model.frame import DelimitedFrame, Part
+from qlinkgen.model.frame import ATTRIBUTE, DelimitedFrame, Part
+from qlinkgen.model.types import Scalar
 from qlinkgen.schema.conditions import ConditionBuilder
 from qlinkgen.schema.file_frames import PartSpec
 from qlinkgen.schema.notation import TestText
@@ -16,6 +17,10 @@ from qlinkgen.schema.source import Path
 
 _RULE = "part-condition"
 _LONG = "long-length"
+#: Roles of parts at the end of a frame that it has as a whole or not.
+_WHOLE = ("constant", "checksum")
+#: Conditions are about other fields than the one that has them.
+_NO_TYPE = Scalar(bits=8, chunks=(), minimum=0, maximum=0)
 
 
 class PartConditions(ConditionBuilder):
@@ -26,6 +31,9 @@ class PartConditions(ConditionBuilder):
         super().__init__({}, path, report)
         self._written = specs
         self._known: dict[str, Value] = {}
+        #: Those that the condition of a part may be about.
+        self._names: Mapping[str, Value] = {}
+        self._lengths: dict[str, Value] = {}
         #: Lengths with a number that hands over to a longer one, and that number.
         self._handing: dict[str, int] = {}
 
@@ -37,6 +45,8 @@ class PartConditions(ConditionBuilder):
         texts = self._written[part.name].when or ()
         if part.otherwise is not None:
             self._handing[part.name] = part.otherwise
+        elif part.role == "length" and part.scalar and not texts:
+            self._lengths[part.name] = Value(part.name, part.scalar, part.doc, part.field)
         if not texts:
             values = (bits for bits in part.bits if bits.type is not None and not bits.party)
             self._known |= {
@@ -46,11 +56,15 @@ class PartConditions(ConditionBuilder):
             return part
         if part.role == "length":
             return self._longer(part, texts)
-        if not _holds_values(part):
+        self._names = self._known
+        if part.role in _WHOLE:
+            # Their absence leaves no value at its default, so that the size of a frame may decide, too.
+            self._names = self._known | self._lengths
+        elif not _holds_values(part):
             what = f"{part.name} holds more than values of a frame"
-            self._error(part.name, "if", what, "let only parts with such values depend on others")
+            self._error(part.name, "if", what, "let only values, constants and check values depend on others")
             return part
-        return replace(part, when=self._condition(Field(part.name, part.field.type), texts, ()))
+        return replace(part, when=self._condition(Field(part.name, _NO_TYPE), texts, ()))
 
     def _longer(self, part: Part, texts: Sequence[TestText]) -> Part:
         """A length that is there where an earlier one hands over to it."""
@@ -68,7 +82,7 @@ class PartConditions(ConditionBuilder):
 
     def _values(self, field: Field, before: Sequence[Field]) -> Mapping[str, Value]:
         del field, before
-        return self._known
+        return self._names
 
     def _error(self, field: str, key: str, what: str, hint: str) -> None:
         place = (*self._path, field)
@@ -150,18 +164,36 @@ def _faults(frame: DelimitedFrame, part: Part) -> Iterator[tuple[str, str]]:
     if other := next((each.name for each in following if each.when != part.when), ""):
         where = "it to the end" if at > payload else f"it directly before {frame.payload.name}"
         yield f"{other} follows {name}, and has another condition or none", f"move {where}"
+    if part.role in _WHOLE and at < payload:
+        yield f"{name} is a {part.role} before {frame.payload.name}", "move it to the end"
+    yield from _check_faults(frame, part)
     for each in frame.parts:
-        yield from _misuses(each, name, trails=at > payload, early=names.index(each.name) < payload)
+        yield from _misuses(each, part, trails=at > payload, early=names.index(each.name) < payload)
 
 
-def _misuses(other: Part, name: str, *, trails: bool, early: bool) -> Iterator[tuple[str, str]]:
+def _check_faults(frame: DelimitedFrame, part: Part) -> Iterator[tuple[str, str]]:
+    """What a check value that only some frames have cannot cover."""
+    check, others = part.checksum, {each.name for each in frame.parts if each.checksum}
+    if check is None:
+        return
+    if check.otherwise is not None:
+        yield f"{part.name} has a value for nothing", "remove otherwise"
+    if other := next((each for each in check.over if each in others), ""):
+        yield f"{part.name} covers the check value {other}", f"leave {other} out of over"
+    if seed := next((each for each in check.over if each.startswith(ATTRIBUTE)), ""):
+        yield f"{part.name} covers {seed}", f"leave {seed} out of over"
+
+
+def _misuses(other: Part, part: Part, *, trails: bool, early: bool) -> Iterator[tuple[str, str]]:
     """How another part depends on one that a frame may not have."""
+    name = part.name
     if other.derivation and other.derivation.of == name:
         yield f"{other.name} follows from {name}, which not every frame has", "let it follow from another"
     if other.checksum and other.checksum.every:
         what = f"{other.name} has values for blocks of the payload"
         yield what, f"remove every, or the condition of {name}"
-    if other.checksum and name in other.checksum.over and (trails or early):
+    together = trails and other.when == part.when
+    if other.checksum and name in other.checksum.over and (trails or early) and not together:
         hint = f"leave {name} out of over"
         if not trails:
             hint += ", or move the check value after the payload"

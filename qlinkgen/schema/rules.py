@@ -183,7 +183,8 @@ _ALL = (
         "A part that only some frames have holds values, and the header tells whether it is there.",
         "Values before the payload decide, and a length gives the size of the payload. Such parts come last "
         "in the header or in the frame, and all there have one condition; no length counts them. A check "
-        "value after the payload may cover those of the header.",
+        "value after the payload may cover those of the header. Last in the frame, constants and check "
+        "values over other parts may be such parts, and depend on the length as well.",
     ),
     Rule(
         "bad-terminated",

@@ -146,3 +146,50 @@ def test_a_length_says_what_only_it_can_say(text: str) -> None:
         load(protocol).decode_request(wire)
     with pytest.raises(ConstructError, match="length"):
         construct.live(protocol).frames["request"].parse(wire)
+
+
+_SEALED = """
+qlinkgen: 1
+protocol: {name: sealed, revision: "1", source: Made up}
+byteorder: big
+frame:
+  parts:
+    start: 55 FF
+    code: {role: message, type: u8}
+    length: {type: u8, counts: data}
+    data: {role: payload, size: 0..32}
+    mark: {value: 5A, if: {length: not 0}}
+    crc: {type: u16, byteorder: little, algorithm: crc-16/ibm-sdlc, over: [data], if: {length: not 0}}
+bus: {kind: master_slave}
+defaults: {addressing: none, repeat: safe}
+commands:
+  go: {id: 1, request: {data: "bytes[0..32]"}, response: {}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [(b"", "55 FF 01 00"), (b"123456789", "55 FF 01 09 31 32 33 34 35 36 37 38 39 5A 6E 90")],
+)
+def test_only_frames_with_data_have_a_check_value(data: bytes, text: str) -> None:
+    protocol, faults = loads(_SEALED, "sealed.yaml")
+    assert protocol is not None
+    assert not faults
+    module, wire, plan = load(protocol), bytes.fromhex(text), plan_of(protocol)
+    assert Codec(plan).encode("go.request", {"data": data}) == wire
+    assert module.GoRequest(data=data).to_frame() == wire
+    assert module.StreamDecoder("request").feed(wire * 2) == [module.GoRequest(data=data)] * 2
+    frame = construct.live(protocol).frames["request"]
+    assert frame.build(frame.parse(wire)) == wire
+    assert not dissect(plan, wire, "request").faults
+    for at, kind in ((-1, "crc"), (-3, "frame")) if data else ():
+        wrong = bytearray(wire)
+        wrong[at] ^= 1
+        assert [fault.kind for fault in dissect(plan, bytes(wrong), "request").faults] == [kind]
+        with pytest.raises(module.DecodeError) as error:
+            module.decode_request(bytes(wrong))
+        assert error.value.kind == kind
+        with pytest.raises(ConstructError):
+            frame.parse(bytes(wrong))
+        found, rest = module.StreamDecoder("request").feed(bytes(wrong) + wire)[:2]
+        assert (found.kind, rest) == (kind, module.GoRequest(data=data))

@@ -53,6 +53,8 @@ class CheckWriter(Places):
         checks = self.envelope.checks
         if len(checks) != 1 or checks[0] not in self.envelope.back or self.envelope.seeded:
             return None
+        if self.envelope.conditional_checks:
+            return None
         if checks[0].check.otherwise is not None:
             return None
         return checks[0]
@@ -136,7 +138,9 @@ class CheckWriter(Places):
     @property
     def values(self) -> list[ValueView]:
         """The functions that compute check values; none if the only one is computed in passing."""
-        return [self._value(part) for part in self.envelope.filling] if self.alone is None else []
+        if self.alone is not None:
+            return []
+        return [self._value(part) for part in (*self.envelope.filling, *self.envelope.conditional_checks)]
 
     def _value(self, part: CheckPart) -> ValueView:
         algorithm = self.algorithms[part.check.algorithm]
@@ -173,20 +177,25 @@ class CheckWriter(Places):
         )
 
     def _function(self, part: CheckPart) -> str:
-        return f"{self.own}_value_{self.envelope.checks.index(part) + 1}_"
+        checks = (*self.envelope.checks, *self.envelope.conditional_checks)
+        return f"{self.own}_value_{checks.index(part) + 1}_"
 
     def fills(self, body: str, end: str, payload_end: str) -> list[str]:
         """Statements that compute and write the check values of a body; ``end`` is the end of its payload."""
         lines: list[str] = []
         for part in self.envelope.filling if self.alone is None else ():
-            place = end if part in self.envelope.back else body
-            put = indented(put_check(part.check, place, self._at(part), "value"))
-            filled = [*self._computed(part, body, payload_end), *put, "}"]
+            filled = self.fill(part, body, end, payload_end)
             if part in self.envelope.seeded:
                 known = f"{self.prefix}_seeds_({self.message_id(self.sender.id)})"
                 filled = self._with_seeds(known, filled)
             lines += filled
         return lines
+
+    def fill(self, part: CheckPart, body: str, end: str, payload_end: str) -> list[str]:
+        """Statements that compute and write a check value."""
+        place = end if part in self.envelope.back else body
+        put = indented(put_check(part.check, place, self._at(part), "value"))
+        return [*self._computed(part, body, payload_end), *put, "}"]
 
     def _with_seeds(self, known: str, lines: list[str]) -> list[str]:
         """Statements that use the seeds of a message, after one that refuses an id without any."""
@@ -201,6 +210,9 @@ class CheckWriter(Places):
         seeded = self.envelope.seeded
         late = [part for part in self.envelope.checks if part not in (*early, *seeded)]
         lines = [line for part in late for line in self.judge(part, body, end, payload_end)]
+        if (after := self.envelope.after) and after.checks:
+            judged = [line for part in after.checks for line in self.judge(part, body, end, payload_end)]
+            lines += [f"if ({holds(self, after, body)}) {{", *indented(judged), "}"]
         if seeded:
             directed = "direction, " if self.directed else ""
             known = f"{self.prefix}_known_seeds_({directed}{self.message_id(self.number(self.envelope.id))})"

@@ -60,11 +60,15 @@ class PartWriter(CheckWriter):
         """Parts that only some frames have; those after the payload begin at ``place``."""
         if found is None:
             return None
+        filled = [self.fill(part, "wire", place, f"{self.head_text} + sent") for part in found.checks]
         return ConditionalView(
             sent=holds(self, found, "wire"),
             received=holds(self, found, "body"),
             size=found.size,
-            put=[line for part in found.parts for line in self._put(part, place, "wire", "sent")],
+            put=[
+                *(line for part in found.parts for line in self._put(part, place, "wire", "sent")),
+                *(line for lines in filled for line in lines),
+            ],
             refused=refused(found),
         )
 
@@ -274,18 +278,21 @@ class PartWriter(CheckWriter):
 
     def wrong_tail(self, place: str) -> str:
         """The condition for a wrong constant or derived number after the payload, which ends at ``place``."""
-        return any_of(
-            test
-            for part in self.envelope.back
-            for test in (
-                (
-                    f"{place}[{self._at(part) + index}] != {in_hex(byte)}"
-                    for index, byte in enumerate(part.data)
-                )
-                if isinstance(part, ConstantPart)
-                else self._wrong(part)
-            )
-        )
+        found = [
+            test for part in self._always(self.envelope.back) for test in self._wrong_at_end(part, place)
+        ]
+        if after := self.envelope.after:
+            held = [test for part in after.parts for test in self._wrong_at_end(part, place)]
+            wrong = f"({any_of(held)})" if len(held) > 1 else f"({held[0]})" if held else ""
+            found += [f"({holds(self, after, 'body')}) && {wrong}"] if wrong else []
+        return any_of(found)
+
+    def _wrong_at_end(self, part: Part, place: str) -> Iterator[str]:
+        """Conditions that hold if a part after the payload, which ends at ``place``, is wrong."""
+        if isinstance(part, ConstantPart):
+            for index, byte in enumerate(part.data, self._at(part)):
+                yield f"{place}[{index}] != {in_hex(byte)}"
+        yield from self._wrong(part)
 
     def _wrong(self, part: Part) -> Iterator[str]:
         """Conditions that hold if a constant or a derived number in an integer is wrong."""

@@ -73,10 +73,15 @@ class ConditionalFrame(DelimitedFrame):
 
     def _settled(self, cells: dict[str, bytes]) -> dict[str, bytes]:
         absent = self._absent(cells)
+        checks = {check.name for check in self.checks}
         for name, initial in absent.items():
-            if cells[name] != initial and name not in self.lengths:
+            if cells[name] != initial and name not in {*self.lengths, *checks}:
                 raise ValidationError(f"a frame with these values does not have {name}")
         return cells | dict.fromkeys(absent, b"")
+
+    def _due(self, cells: Mapping[str, bytes]) -> Sequence[Check]:
+        absent = self._absent(cells)
+        return [check for check in self.checks if check.name not in absent]
 
     def _taken(self, source: _Wire, part: Part, cells: Mapping[str, bytes]) -> bytes:
         held = any(part.name in each.names for each in self.present)

@@ -474,7 +474,7 @@ class Frame(Construct):
             else:
                 cells[part.name] = self._cell(part, shown, sent, address, cells)
         cells = self._settled(cells) | message.seeds
-        left = self.checks if message.checksum else []
+        left = self._due(cells) if message.checksum else []
         while left:  # a check value may cover others
             names = {part.name for part in left}
             part = next(part for part in left if names.isdisjoint(part.over))
@@ -494,6 +494,10 @@ class Frame(Construct):
     def _number(self, message: Message) -> int:
         """The number of a message in a frame."""
         return message.id
+
+    def _due(self, cells: Mapping[str, bytes]) -> Sequence[Check]:
+        """The check values that a frame has."""
+        return self.checks
 
     def _settled(self, cells: dict[str, bytes]) -> dict[str, bytes]:
         """The parts as sent."""
@@ -623,7 +627,7 @@ class Frame(Construct):
         """Check a frame in cells: check value, message, sizes, values, address. Returns its message."""
         found = self.by_id.get(number)
         seeds = found.seeds if found else {}
-        unseeded = [check for check in self.checks if not _seeds(check)]
+        unseeded = [check for check in self._due(cells) if not _seeds(check)]
         for check in unseeded if found is None or found.checksum else ():
             self._compare(check, cells, request)
         self._compare_blocks(cells, payload)

@@ -6,8 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from qlinkgen.backends.python import pieces, values
+from qlinkgen.backends.python.check_views import PlacedCheck
 from qlinkgen.backends.python.decode import Decoder
 from qlinkgen.backends.python.encode import Encoder
+from qlinkgen.backends.python.frame_checks import placed
 from qlinkgen.backends.python.layout import listing, literal
 from qlinkgen.backends.python.names import attribute, held, natural
 from qlinkgen.backends.python.place import Place
@@ -46,14 +48,18 @@ class AfterView(ConditionalView):
     Attributes:
         met: the same as an expression.
         values: the values in them.
-        octets: statements of a method that returns their bytes.
+        octets: statements of a method that returns their bytes, with zeros for check values.
         taken: statements of a method that sets the values from the end of ``frame``.
+        checks: the check values among them.
+        tests: conditions for wrong constants in ``frame`` if it has the parts.
     """
 
     met: str
     values: Sequence[AfterValue]
     octets: Sequence[str]
     taken: Sequence[str]
+    checks: Sequence[PlacedCheck]
+    tests: Sequence[str]
 
     @property
     def needed(self) -> str:
@@ -96,12 +102,16 @@ def after_view(
     found = envelope.after
     if found is None:
         return None
-    parts = [part for part in found.parts if isinstance(part, CellPart)]
+    cells = [part for part in found.parts if isinstance(part, CellPart)]
     scales = {each.name: scale(each.name, each.number) for each in found.values if each.number.scaling}
     encoder, decoder = Encoder(message, place, "", "", scales), Decoder(message, place, "", scales)
-    octets = [encoder.octets(part) for part in parts]
-    for part in parts:
+    octets = [
+        encoder.octets(part) if isinstance(part, CellPart) else literal(packed)
+        for part, packed in zip(found.parts, found.packed, strict=True)
+    ]
+    for part in cells:
         decoder.take_end(envelope, part)
+    first = len(envelope.checks) + 1
     taken = [line.replace("message.", "self.") for line in decoder.assignments]
     return AfterView(
         *_facts(envelope, found),
@@ -112,12 +122,19 @@ def after_view(
         ],
         octets=[*encoder.checks, f"return {' + '.join(octets)}"],
         taken=["cls = type(self)", *taken] if any("illegal(" in line for line in taken) else taken,
+        checks=[
+            placed(envelope, part, f"_{number}", early=False)
+            for number, part in enumerate(found.checks, first)
+        ],
+        tests=[test for part in found.parts for test in pieces.tail_tests(envelope, part)],
     )
 
 
 def _facts(envelope: Envelope, found: Conditional) -> tuple[str, bool, Sequence[str], int, str]:
     """The first attributes of a view."""
-    names = [attribute(member.name) for member in found.values] or [each.name for each in found.parts]
+    held = {part.name for part in found.parts if isinstance(part, CellPart)}
+    names = [attribute(member.name) for member in found.values]
+    names += [part.name for part in found.parts if part.name not in held]
     listed = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
     tests = list(_tests(envelope, found))
     return listed, found.length is None, tests, found.size, literal(found.initial)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import assert_never
 
 from qlinkgen.backends.python import integers
-from qlinkgen.backends.python.frame_views import CheckView, PlacedCheck
+from qlinkgen.backends.python.check_views import CheckView, PlacedCheck
 from qlinkgen.backends.python.layout import wrapped
 from qlinkgen.model.checksum import Algorithm, Checksum, Fletcher, Sum, Xor, catalogue
 from qlinkgen.plan.check import Check

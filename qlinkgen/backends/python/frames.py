@@ -228,7 +228,7 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
         values=[attribute(member.name) for _, member in whole.values],
         counter=_counter(plan),
         master=_master(plan),
-        tail_tests=[test for part in envelope.back for test in _tail_tests(envelope, part)],
+        tail_tests=[test for part in envelope.back for test in pieces.tail_tests(envelope, part)],
         before=before_view(envelope),
     )
 
@@ -270,13 +270,6 @@ def _id_start(envelope: Envelope) -> str:
         return "0"
     part = envelope.id[0].part
     return str(envelope.offset(part)) if part in envelope.front else f"len(frame) - {envelope.from_end(part)}"
-
-
-def _tail_tests(envelope: Envelope, part: Part) -> Iterator[str]:
-    """Conditions that hold if a part after the payload is wrong."""
-    if isinstance(part, ConstantPart):
-        yield f"not frame[{-envelope.from_end(part)}:].startswith({literal(part.data)})"
-    yield from pieces.wrong(envelope, part, "frame")
 
 
 def _idle(silence: Silence | None) -> tuple[float, float] | None:

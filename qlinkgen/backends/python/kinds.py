@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 from typing import assert_never
 
 from qlinkgen.backends.python import integers, pieces, values
+from qlinkgen.backends.python.check_views import CheckView, PlacedCheck
 from qlinkgen.backends.python.decode import Decoder
 from qlinkgen.backends.python.encode import Encoder
 from qlinkgen.backends.python.frame_checks import check_view, placed, seed_name
-from qlinkgen.backends.python.frame_views import CheckView, EndedView, FrameView, PlacedCheck
+from qlinkgen.backends.python.frame_views import EndedView, FrameView
 from qlinkgen.backends.python.frames import ended_view
 from qlinkgen.backends.python.layout import in_hex, literal
 from qlinkgen.backends.python.names import attribute, natural
@@ -253,7 +254,7 @@ def _kind(frame: FramePlan, plan: Plan, make: Maker) -> KindView:
         head_tests=list(_head_tests(envelope, frame.name)),
         begun=list(_begun(envelope)),
         size=_size(frame, envelope),
-        tail_tests=[test for part in envelope.back for test in _tail_tests(envelope, part)],
+        tail_tests=[test for part in envelope.back for test in pieces.tail_tests(envelope, part)],
         number_in_head=base + _grouped(pieces.number(envelope, envelope.id, "head"), base),
         number=base + _grouped(pieces.number(envelope, envelope.id, "frame"), base),
         address=pieces.number(envelope, envelope.address, "frame") if addressed else "None",
@@ -442,10 +443,3 @@ def _begun(envelope: Envelope) -> Iterator[str]:
     if not envelope.preamble:
         sizes = range(1, len(envelope.starts[0]) + 1)
         yield from map(literal, sorted({start[:size] for start in envelope.starts for size in sizes}))
-
-
-def _tail_tests(envelope: Envelope, part: Part) -> Iterator[str]:
-    """Conditions that hold if a part after the payload is wrong."""
-    if isinstance(part, ConstantPart):
-        yield f"not frame[{-envelope.from_end(part)}:].startswith({literal(part.data)})"
-    yield from pieces.wrong(envelope, part, "frame")

@@ -240,7 +240,7 @@ class Module:
         if check is not None:
             used |= {"Checksum", check.maker, *(["wrong_check"] if _has_late_check(views) else [])}
             used |= {"find_crc"} if check.selectable else set()
-        used |= {check.view.maker for each in views if isinstance(each, PartsView) for check in each.checks}
+        used |= _check_makers(views)
         match view:
             case UniqueView():
                 used |= {"UNREAD", "UNREADABLE", *(["Struct"] if view.whole_sizes else [])}
@@ -343,14 +343,22 @@ def _placed(template: str, module: ModuleView, **parts: str) -> str:
     return templates().get_template(f"templates/{template}").render(vars(module), **parts)
 
 
+def _check_makers(views: Sequence[AnyView]) -> set[str]:
+    """What the check values of frames use."""
+    parts = [each for each in views if isinstance(each, PartsView)]
+    late = [check for each in parts for check in (each.after.checks if each.after else ())]
+    makers = {check.view.maker for each in parts for check in each.checks}
+    return makers | ({"wrong_check", *(check.view.maker for check in late)} if late else set())
+
+
 def _has_digits(plan: Plan) -> bool:
     coded = plan.frame.transparency
     return isinstance(coded, Coded) and any(isinstance(stage, Digits) for stage in coded.stages)
 
 
 def _has_after(views: Sequence[AnyView]) -> bool:
-    """Whether frames end with parts that only some have."""
-    return any(isinstance(each, PartsView) and each.after for each in views)
+    """Whether frames end with parts that only some have, with values in them."""
+    return any(isinstance(each, PartsView) and each.after and each.after.values for each in views)
 
 
 def _has_late_check(views: Sequence[AnyView]) -> bool:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from qlinkgen.backends.python import integers
+from qlinkgen.backends.python.layout import literal
 from qlinkgen.plan.envelope import Envelope
-from qlinkgen.plan.parts import Bits, CellPart, EqualPart, Numeric, Part
+from qlinkgen.plan.parts import Bits, CellPart, ConstantPart, EqualPart, Numeric, Part
 
 
 def number(envelope: Envelope, pieces: tuple[Bits, ...], source: str, skipped: int = 0) -> str:
@@ -48,6 +49,13 @@ def wrong(envelope: Envelope, part: Part, source: str) -> Iterator[str]:
             yield f"{read(envelope, part, source)} != {derived_part(part, read(envelope, part.of, source))}"
         case _:
             pass
+
+
+def tail_tests(envelope: Envelope, part: Part) -> Iterator[str]:
+    """Conditions that hold if a part after the payload is wrong."""
+    if isinstance(part, ConstantPart):
+        yield f"not frame[{-envelope.from_end(part)}:].startswith({literal(part.data)})"
+    yield from wrong(envelope, part, "frame")
 
 
 def derived_part(part: EqualPart, other: str) -> str:

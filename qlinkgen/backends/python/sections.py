@@ -84,7 +84,9 @@ class Sections:
         view = self._view
         if view.template != "delimited":
             return self._rendered(view.template, view).strip()
-        ended = any(isinstance(each, PartsView) and each.after for each in self.views.values())
+        ended = any(
+            isinstance(each, PartsView) and each.after and each.after.values for each in self.views.values()
+        )
         message = self._rendered("delimited_message", view, ended=ended)
         if not self.directed:
             return (self._rendered("delimited", view, owner="Message") + message).strip()

@@ -277,7 +277,7 @@ class _Frame:
     def _value(self, part: CheckPart) -> int:
         """The right check value."""
         cells = dict(self._cells)
-        for each in self._envelope.filling:
+        for each in (*self._envelope.filling, *self._envelope.conditional_checks):
             value = self._codec.check_value(each, self._envelope, cells, self._good.request)
             if each is part:
                 return value

@@ -9,7 +9,8 @@ Doc = dict[str, Any]
 
 
 #: Names of the added values, first of those before the payload.
-NAMES = ("hop_count", "zone_id", "seal", "seal_time", "long_size")
+NAMES = ("hop_count", "zone_id", "seal", "seal_time", "long_size", "late_mark", "late_sum", "late_end")
+_ALGORITHMS = (("sum8", "u8"), ("crc-16/xmodem", "u16"), ("fletcher-8", "u16"), ("crc-32/iso-hdlc", "u32"))
 
 
 def add(rng: random.Random, frame: Doc) -> None:
@@ -32,15 +33,39 @@ def add(rng: random.Random, frame: Doc) -> None:
         before = {"long_size": longer}
     most = rng.choice((0, 1, 2) if before else (1, 2))
     after = {name: _value(rng) for name in NAMES[2 : 2 + most]}
-    for group in (before, after):
-        test = rng.choice(_tests(signed=signed))
+    # Drawn from another source: the schemas of earlier seeds stay what they are.
+    more = random.Random(repr(rng.getstate()))
+    groups = [(group, rng.choice(_tests(signed=signed))) for group in (before, after)]
+    if more.random() < 0.4:
+        found = _whole(more, parts, [*before])
+        alone = more.random() < 0.5
+        sized: list[Doc] = [{size: "not 0"}, {size: "3..9"}] if "otherwise" not in parts[size] else []
+        test = more.choice([*sized, groups[1][1]]) if alone else groups[1][1]
+        after = found if alone else after | found
+        groups[1] = after, test
+    for group, test in groups:
         for spec in group.values():
             spec.setdefault("if", test)
     ordered |= before | {each: parts[each] for each in names[payload:]} | after
     parts.clear()
     parts.update(ordered)
-    for each in [*parts][len(names[:payload]) + 1 + len(before) :]:
+    for each in names[payload:]:
         _cover(rng, parts[each], names, [*before], payload)
+
+
+def _whole(rng: random.Random, parts: Doc, before: list[str]) -> Doc:
+    """Constants and a check value at the end of a frame."""
+    found: Doc = {"late_mark": {"role": "constant", "value": "5A"}} if rng.random() < 0.4 else {}
+    if not found or rng.random() < 0.8:
+        kept = [name for name, spec in parts.items() if spec.get("role") != "checksum" and "if" not in spec]
+        at = next(index for index, name in enumerate(kept) if parts[name].get("role") == "payload")
+        able = (*kept[:at], *before, *kept[at:], *found)
+        covered = [name for name in able if rng.random() < 0.7] or kept[-1:]
+        algorithm, kind = rng.choice(_ALGORITHMS)
+        found["late_sum"] = {"role": "checksum", "type": kind, "algorithm": algorithm, "over": covered}
+        if rng.random() < 0.3:
+            found["late_end"] = {"role": "constant", "value": "0D 0A"}
+    return found
 
 
 def _longer(rng: random.Random, parts: Doc, size: str, payload: Doc) -> Doc:

@@ -410,9 +410,10 @@ class Frame:
                 cut[part.name] = put(part.pieces, self.derived(part, cut))
             else:
                 cut[part.name] = payload if part.role == "payload" else part.constant
-        cut |= {**dict.fromkeys(self.lacking(given, cut), b""), **self.seeds.get(number, {})}
+        lacking = self.lacking(given, cut)
+        cut |= {**dict.fromkeys(lacking, b""), **self.seeds.get(number, {})}
         for _ in self.checks:  # so often that those which cover others become right
-            for check in self.checks:
+            for check in (each for each in self.checks if each.name not in lacking):
                 cut[check.name] = _shown(check, self.check_value(check, cut))
         return self._stuffed(cut | self._blocked(payload))
 
@@ -501,7 +502,8 @@ class Frame:
         """Names of the parts that a frame with these values and this header does not have."""
         numbers = {name: kind.default for part in self.parts for name, _, kind in part.values}
         numbers |= {name: raw for name, raw in given.items() if isinstance(raw, int)}
-        numbers |= {part.name: get(part.pieces, cut[part.name]) for part in self.parts if self.handing(part)}
+        lengths = [part for part in self.parts if part.role == "length" and part is not self.longer]
+        numbers |= {part.name: get(part.pieces, cut[part.name]) for part in lengths}
         return [name for name, tests in self.tests.items() if not met(tests, numbers)]
 
     def id_bits(self) -> list[tuple[str, int, int, str]]:
@@ -561,6 +563,7 @@ class Frame:
             if cut[self.blocks.name] != values:
                 return True
         checks = [each for each in self.checks if {each.name, *each.spec["over"]} <= cut.keys()]
+        checks = [each for each in checks if self.has(each, cut)]
         return any(
             _shown(each, self.check_value(each, cut)) not in _cases(each, cut[each.name]) for each in checks
         )

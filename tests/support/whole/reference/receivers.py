@@ -262,9 +262,8 @@ class Searcher(Receiver):
             raise Refused("unknown")
         cut = self.splitter.split(self.buffer)
         event = self._event(cut, self._plain(cut))
-        unproven = not (self.frame.checks or self.frame.blocks) or (
-            self.frame.seeded and event.kind == "unknown"
-        )
+        always = [each for each in self.frame.checks if each.name not in self.frame.tests]
+        unproven = not (always or self.frame.blocks) or (self.frame.seeded and event.kind == "unknown")
         if self._damaged(cut) or (event.kind != "message" and unproven):
             # It may not be a frame at all, so another one may begin after its first byte.
             raise Refused(event.kind, cut.size)
