@@ -130,6 +130,37 @@ def test_what_ends_a_motion(bench: Bench, command: str) -> None:
     assert bench.has(AxisStatus.MOTION_COMPLETE) == (command == "stop")
 
 
+@pytest.mark.parametrize("clear", ["clr_status", "rst_status", "rst_intrpt"])
+def test_a_motion_error_cannot_be_cleared_while_it_lasts(bench: Bench, clear: str) -> None:
+    mask = {} if clear == "clr_status" else {"mask": 0}
+    bench.do("set_intrpt_mask", mask=AxisStatus.MOTION_ERROR)
+    bench.do("set_pos_err", value=40)
+    bench.chip.hold(1)
+    bench.move()
+    bench.wait(40)
+    bench.do(clear, **mask)
+    assert bench.has(AxisStatus.MOTION_ERROR)
+    bench.chip.hold(1, held=False)
+    bench.do(clear, **mask)
+    assert not bench.has(AxisStatus.MOTION_ERROR)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_sign_of_the_position_error_can_be_chosen(sign: int) -> None:
+    bench = Bench(error_sign=sign)
+    bench.chip.hold(1)
+    bench.move()
+    bench.wait(20)
+    assert bench.do("get_actl_pos_err").value == sign * bench.axis.target != 0
+    bench.do("reset")
+    bench.chip.hold(1)
+    bench.move()
+    bench.wait(20)
+    assert bench.do("get_actl_pos_err").value == sign * bench.axis.target != 0
+    with pytest.raises(ValueError, match="error_sign must be 1 or -1, not 0"):
+        ChipSet(error_sign=0)
+
+
 def test_a_held_motor_falls_behind_until_it_is_an_error(bench: Bench) -> None:
     bench.do("set_pos_err", value=40)
     bench.chip.hold(1)
@@ -186,6 +217,18 @@ def test_positions_wrap(bench: Bench) -> None:
     bench.wait(30)
     assert bench.has(AxisStatus.POSITION_WRAPPED)
     assert -1073741824 <= bench.axis.actual < -1073741600
+
+
+def test_the_second_axis_has_no_electronic_gear(bench: Bench) -> None:
+    bench.do("set_2")
+    mode = bench.do("get_mode").value
+    bench.do("set_prfl_gear")
+    bench.do("set_ratio", value=-0.5)
+    bench.do("update")
+    bench.chip.turn_master(2, 100)
+    assert bench.axis.actual == 0
+    assert bench.do("get_mode").value == mode
+    assert bench.do("get_ratio").value == 0
 
 
 def test_an_electronic_gear_follows_its_master(bench: Bench) -> None:

@@ -36,6 +36,8 @@ def _waits(action: str) -> Action:
 _PROFILES = {"trap": TRAPEZOIDAL, "vel": VELOCITY, "s_crv": S_CURVE, "gear": GEAR}
 _BREAKPOINTS = ("time", "pos", "neg", "actl_pos", "actl_neg", "mtn_cmplt", "ext")
 
+#: Commands of the electronic gear, which only the first axis has.
+GEARING: Final = frozenset({"set_prfl_gear", "set_ratio", "get_ratio"})
 AXIS_COMMANDS: Final[dict[str, Action]] = {
     **{f"set_{register}": _writes(register) for register in (*BUFFERED, *IMMEDIATE)},
     **{f"get_{register}": _reads(register) for register in READABLE},

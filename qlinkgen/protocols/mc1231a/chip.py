@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from typing import Final
 
 from qlinkgen.codecs import mc1231a
-from qlinkgen.protocols.mc1231a.axis_commands import AXIS_COMMANDS
+from qlinkgen.protocols.mc1231a.axis_commands import AXIS_COMMANDS, GEARING, Action
 from qlinkgen.protocols.mc1231a.chip_axis import ChipAxis
 from qlinkgen.protocols.mc1231a.facts import AXES, check_axis
 
@@ -33,12 +33,23 @@ class ChipSet:
         home: level of the home inputs, by axis.
     """
 
-    def __init__(self, *, illegal: Iterable[str] = (), sample_time: float = SAMPLE_TIME) -> None:
-        """Make a chip set; `illegal` commands are answered by a checksum of 0.
+    def __init__(
+        self, *, illegal: Iterable[str] = (), sample_time: float = SAMPLE_TIME, error_sign: int = 1
+    ) -> None:
+        """Make a chip set.
+
+        Args:
+            illegal: names of commands that it answers by a checksum of 0.
+            sample_time: seconds of a sample.
+            error_sign: 1 if get_actl_pos_err reports target minus actual position, -1 for the reverse: the
+                sources do not agree.
 
         Raises:
-            ValueError: a command is unknown, or `sample_time`, in seconds, is not positive.
+            ValueError: a command is unknown, `sample_time` not positive, or `error_sign` another number.
         """
+        if error_sign not in {1, -1}:
+            raise ValueError(f"error_sign must be 1 or -1, not {error_sign}")
+        self._error_sign = error_sign
         self.illegal = frozenset(illegal)
         if unknown := self.illegal - set(mc1231a.COMMANDS):
             raise ValueError(f"illegal: unknown command {min(unknown)!r}; see `qlinkgen show mc1231a`")
@@ -57,7 +68,7 @@ class ChipSet:
 
     def _reset(self) -> None:
         """Reset, as after power-on; the levels of the inputs do not change."""
-        self.axes = {axis: ChipAxis(self.axes[axis].limits) for axis in AXES}
+        self.axes = {axis: ChipAxis(self.axes[axis].limits, error_sign=self._error_sign) for axis in AXES}
         self.current = 1
         self.time = 0
         self.values = {"smpl_time": 0, "lmt_sense": 0}
@@ -87,7 +98,13 @@ class ChipSet:
         if own is not None:
             return lambda request: own(*(getattr(request, field) for field in fields))
         action = AXIS_COMMANDS[name]
+        if name in GEARING:
+            return lambda request: self._gear(action, *(getattr(request, field) for field in fields))
         return lambda request: action(self._axis, *(getattr(request, field) for field in fields))
+
+    def _gear(self, action: Action, *values: float) -> float | None:
+        """Execute a command of the electronic gear of axis 1; axis 2, whose encoder leads it, has none."""
+        return action(self._axis, *values) if self.current == 1 else 0
 
     @property
     def _axis(self) -> ChipAxis:

@@ -34,8 +34,9 @@ class ChipAxis:
         limits: inputs of the limit switches, positive and negative; True if active.
     """
 
-    def __init__(self, limits: list[bool] | None = None) -> None:
+    def __init__(self, limits: list[bool] | None = None, *, error_sign: int = 1) -> None:
         self.limits = limits if limits is not None else [False, False]
+        self._error_sign = error_sign
         self.values: dict[str, float] = after_reset()
         self.active: dict[str, float] = {name: self.values[name] for name in BUFFERED}
         self.pending: set[str] = set()
@@ -96,8 +97,8 @@ class ChipAxis:
 
     @property
     def position_error(self) -> int:
-        """Position error, limited to a word."""
-        return max(min(self.lost, 32767), -32768)
+        """Position error as reported, limited to a word."""
+        return max(min(self._error_sign * self.lost, 32767), -32768)
 
     @property
     def motor_command(self) -> int:
@@ -151,8 +152,9 @@ class ChipAxis:
     # Events -------------------------------------------------------------------------------------------------
 
     def keep_events(self, mask: int = 0) -> None:
-        """Clear every event that has a 0 in the mask."""
+        """Clear every event that has a 0 in the mask; a motion error stays as long as the error lasts."""
         self.events &= mask
+        self._judge_error()
 
     def raise_event(self, event: int) -> None:
         """Set an event of the status word."""
@@ -281,10 +283,15 @@ class ChipAxis:
         self._wrap()
         if self._blocked(direction):
             self._end(complete=False)
-        if abs(self.lost) > self.values["pos_err"]:
+        if self._judge_error() and self.auto_stop:
+            self.switch_motor(on=False)
+
+    def _judge_error(self) -> bool:
+        """Raise the motion error while the position error is too large; return whether it is."""
+        too_large = abs(self.lost) > self.values["pos_err"]
+        if too_large:
             self.raise_event(AxisStatus.MOTION_ERROR)
-            if self.auto_stop:
-                self.switch_motor(on=False)
+        return too_large
 
     def _wrap(self) -> None:
         turns = (self.target + HALF_TURN) // (2 * HALF_TURN)
