@@ -88,6 +88,8 @@ class VirtualRing:
             SimulationError: an argument is out of range.
         """
         self.nodes = make_nodes(ring, baud=baud, **options)
+        if all(isinstance(node, KeypadNode) for node in self.nodes):
+            raise SimulationError("a ring needs a Motion Coordinator, which gives keypads their offset")
         self.wire = RingWire(trio, baud=baud, faults=faults, outside=False)
         for number, node in enumerate(self.nodes):
             self.wire.attach(engine_of(node), f"node {number}")

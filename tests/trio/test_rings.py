@@ -133,6 +133,8 @@ def test_a_ring_has_15_places() -> None:
         VirtualRing(["coordinator"] * 16)
     with pytest.raises(SimulationError, match="at least one node"):
         VirtualRing([])
+    with pytest.raises(SimulationError, match="a ring needs a Motion Coordinator"):
+        VirtualRing("keypad,keypad")
     with pytest.raises(
         SimulationError, match=r"unknown kind of node 'plotter'; .* coordinator, keypad, passive"
     ):

@@ -119,12 +119,11 @@ def send_message(node: int, kind: int, data1: int, data2: Number | None) -> trio
 
     Raises:
         ValueError: an argument is out of range.
-        TypeError: data2 is missing, or not allowed.
+        TypeError: data2 is missing.
     """
     address = wire_address(node)
     if kind == OFFSET:
-        if data2 is not None:
-            raise TypeError(f"data2: {data2!r} was given; a keypad offset (type {OFFSET}) has only data1")
+        # Programs pass any data2 here, which BASIC does not use.
         return trio.KeypadOffset(address=address, offset=wire_address(data1, "data1"))
     if kind != VARIABLE:
         raise ValueError(

@@ -127,11 +127,11 @@ class MotionCoordinator(CoordinatorClient, BlockingClient[CoordinatorNode]):
             n: number of the receiver, 10-24.
             type_: 1 to set its variable `data1` to `data2`, 2 to make a keypad send its keys to node `data1`.
             data1: number of the variable, or of the node as counted from the keypad, 10-24.
-            data2: any number; it is rounded to a multiple of 2 to the power of -32.
+            data2: any number; it is rounded to a multiple of 2 to the power of -32. Type 2 does not use it.
 
         Raises:
             ValueError: an argument is out of range.
-            TypeError: data2 is missing, or not allowed.
+            TypeError: data2 is missing.
             NoRoom: the transmit buffer stayed full.
             PortLost: the port was lost.
         """
