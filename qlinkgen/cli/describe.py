@@ -9,6 +9,7 @@ from qlinkgen.model.fields import Record, Records
 from qlinkgen.model.message import Message, Value
 from qlinkgen.model.transaction import (
     Allowance,
+    ByCommand,
     ByCount,
     ByEach,
     ByField,
@@ -73,6 +74,8 @@ def many_text(many: Many) -> str:
             return f"answers until {many.field} is {span_text(many.first, many.last)}"
         case ByReply():
             return f"answers until {many.reply.name}"
+        case ByCommand():
+            return f"answers until {many.command} stops them"
         case ByTime():
             return f"all answers within {time_text(many.within)}"
         case ByEach():

@@ -34,7 +34,7 @@ BELONGS: Belongs = {
     "checksum": (HOST,),
     "check": (HOST,),
     "stay": (RING,),
-    "count": (RING,),
+    "count": (RING, BUS),
 }
 
 
@@ -79,7 +79,7 @@ BELONGS: Belongs = {
     "--count",
     type=click.IntRange(1),
     metavar="N",
-    help="trio: leave earlier, after N messages for this node.",
+    help="trio: leave earlier, after N messages for this node. On a bus: stop endless answers after N.",
 )
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
@@ -109,7 +109,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     written as for encode. For a request without a response, nothing is printed. A request that is unsafe to
     repeat is sent once, regardless of --attempts; so is a message outside commands, which has no response.
     The counter of a motion is sent as given. Of a command with steps, --then gives the values of each frame
-    after the request, and all answers are printed.
+    after the request, and all answers are printed. Answers that another command stops are printed as they
+    come, until Ctrl-C or --count; then that command is sent.
 
     On a ring, the command joins as an additional node: it forwards messages, prints those for this node, and
     leaves after --seconds, as soon as it forwards nothing. Delivery of the message is not confirmed. For
@@ -152,7 +153,7 @@ def command(  # noqa: PLR0917  # click passes them by name
         further = further_of(loaded, codec, found, addresses, then)
         send_on_bus(
             loaded, codec, request, port, further=further, baud=baud, line=line,
-            attempts=attempts, slack=slack, echo=echo, accepts=matching(protocol),
+            attempts=attempts, slack=slack, echo=echo, accepts=matching(protocol), count=count,
         )  # fmt: skip
 
 

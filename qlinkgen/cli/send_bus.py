@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from types import ModuleType
 from typing import cast
 
@@ -13,6 +14,7 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import warn
 from qlinkgen.cli.decode import message_record
 from qlinkgen.cli.encode import compose
+from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.cli.wire_options import Line, counted, echo_mode, open_line, speed
 from qlinkgen.errors import LinkError, Refused
 from qlinkgen.link.codec import Framed
@@ -40,11 +42,16 @@ def send_on_bus(
     slack: float | None,
     echo: str | None,
     accepts: Mapping[str, Accepts] | None,
+    count: int | None,
 ) -> None:
     """Send a request and print the response; send a message outside commands without waiting.
 
-    ``further`` are the frames of a dialogue after the request.
+    ``further`` are the frames of a dialogue after the request; ``count`` of endless answers are printed, None
+    for all of them.
     """
+    endless = {command.request.name for command in protocol.commands if command.stopped}
+    if count is not None and request.NAME not in endless:
+        raise Failure(f"--count requires endless answers; {request.NAME} has none: omit it")
     with open_line(port, speed(protocol, baud), line) as opened:
         if request.NAME not in {command.request.name for command in protocol.commands}:
             _tell(opened, request.to_frame(), codec.BUS.bits_per_byte)
@@ -53,6 +60,9 @@ def send_on_bus(
         timing = timing_of(codec, opened, slack=slack, attempts=attempts)
         engine = MasterEngine(codec, timing, echo=echo_mode(protocol, echo), accepts=accepts)
         try:
+            if request.NAME in endless:
+                _follow(protocol, BlockingMaster(engine, opened), request, count)
+                return
             question = Dialogue(request, further) if further else request
             reply = _transact(protocol, BlockingMaster(engine, opened), question)
         except Refused as refusal:
@@ -66,6 +76,15 @@ def send_on_bus(
     for answer in answers:
         if answer is not None:
             click.echo(jsonlines.line(message_record(protocol, answer)))
+
+
+def _follow(protocol: Protocol, master: BlockingMaster, request: Framed, count: int | None) -> None:
+    """Print endless answers as they come, until a signal or so many; then stop them."""
+    with StopSignals() as signals, closing(master.stream(request)) as answers:
+        for number, answer in enumerate(answers, 1):
+            click.echo(jsonlines.line(message_record(protocol, answer)))
+            if number == count or signals.stopped:
+                break
 
 
 def _tell(port: Port, frame: bytes, bits_per_byte: int) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from qlinkgen.link.codec import Codec, Decoder, DecoderCounters, Fault, Framed, is_message
@@ -30,9 +30,9 @@ class AskedDecoder:
     """The receiver of a master whose answers only their request tells apart."""
 
     def __init__(
-        self, codec: Codec, decoder: Decoder, answers: AnswerTo, asked: Callable[[Framed], Framed | None]
+        self, codec: Codec, decoder: Decoder, answers: AnswerTo, asked: Callable[[Framed], Iterable[Framed]]
     ) -> None:
-        """``asked`` returns the request that a message may answer, None without one."""
+        """``asked`` returns the requests that a message may answer."""
         self._decoder = decoder
         self._answers = answers
         self._asked = asked
@@ -54,10 +54,14 @@ class AskedDecoder:
         return [self._told(event) for event in self._decoder.finish()]
 
     def _told(self, event: Framed | Fault) -> Framed | Fault:
-        if not is_message(event) or (request := self._asked(event)) is None:
+        if not is_message(event):
             return event
-        try:
-            return self._answers(request, event)
-        except self._error as error:
-            raw = event.to_frame()
-            return NotAnAnswer(getattr(error, "kind", ""), self._fed - len(raw), raw, str(error))
+        fault: NotAnAnswer | None = None
+        for request in self._asked(event):
+            try:
+                return self._answers(request, event)
+            except self._error as error:
+                raw = event.to_frame()
+                kind, at = getattr(error, "kind", ""), self._fed - len(raw)
+                fault = fault or NotAnAnswer(kind, at, raw, str(error))
+        return fault or event

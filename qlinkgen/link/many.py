@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
-from qlinkgen.link.codec import Framed, Many, Message, address_of
+from qlinkgen.link.codec import Codec, Command, Framed, Many, Message, address_of
 
 
 def nodes_asked(many: Many, request: Message) -> Sequence[int] | None:
@@ -15,6 +16,49 @@ def nodes_asked(many: Many, request: Message) -> Sequence[int] | None:
     listed = getattr(request, each)
     key: str = getattr(many, "key", "")
     return [int(getattr(item, key)) for item in listed] if key else list(map(int, listed))
+
+
+def is_endless(command: Command) -> bool:
+    """Whether only another command ends the answers of a command."""
+    return hasattr(command.many, "stopped_by")  # of an `UntilStopped`
+
+
+class Stop:
+    """How the answers to a request without an end are stopped."""
+
+    __slots__ = ("_broadcast", "_compared", "_make", "_repeats", "_to_all", "command")
+
+    def __init__(self, command: Command, codec: Codec) -> None:
+        """``command`` is the one with these answers."""
+        many: Any = command.many  # an `UntilStopped` of the generated module
+        self.command: Command = codec.COMMANDS[many.stopped_by]
+        self._broadcast = codec.BUS.broadcast
+        self._make: Any = self.command.request  # its arguments are those of the class
+        self._repeats: tuple[str, ...] = many.repeats
+        fields = _fields(self._make)
+        self._compared = [name for name in self._repeats if name in fields]
+        self._to_all = self.command.addressing == "broadcast"
+
+    def of(self, request: Framed) -> Framed:
+        """The request that stops the answers to one."""
+        given = {name: getattr(request, name) for name in self._repeats}
+        if (address := self.command.request.ADDRESS) and not self._to_all:
+            given[address] = address_of(request)
+        made: Framed = self._make(**given)
+        return made
+
+    def by(self, stop: Framed, request: Framed) -> bool:
+        """Whether a request stops the answers to another one."""
+        if type(stop) is not self.command.request:
+            return False
+        address = address_of(stop)
+        same = all(getattr(stop, name) == getattr(request, name) for name in self._compared)
+        return same and address in {None, self._broadcast, address_of(request)}
+
+
+def _fields(message: Any) -> Sequence[str]:  # Any: a class of the generated module
+    found: tuple[str, ...] = message.FIELDS
+    return found
 
 
 class Answers:
@@ -38,6 +82,8 @@ class Answers:
         self._last = int(getattr(request, many.counted_by)) if many.counted_by else many.count
         if self.nodes is not None:
             self._last = len(set(self.nodes))
+        if hasattr(many, "stopped_by"):  # the first one begins a stream
+            self._last = 1
         self.items: list[Framed] = []
 
     @property

@@ -18,7 +18,7 @@ and the health of the nodes (`health`).
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from qlinkgen.errors import BadReply, Collision, LinkError, NoReply
 from qlinkgen.errors import Refused as RequestRefused
@@ -64,6 +64,7 @@ from qlinkgen.link.numbering import MasterNumber, numbering_of
 from qlinkgen.link.pending import Pending
 from qlinkgen.link.quiet import QuietLine
 from qlinkgen.link.state import Moves
+from qlinkgen.link.streams import Streams
 from qlinkgen.link.timing import Timing, check_attempts
 from qlinkgen.link.transaction import Accepts, CommandTiming, Packet, Question, Reply, settled
 
@@ -100,6 +101,7 @@ class MasterEngine:
         health: state of each node.
         numbering: the counter of its frames, None without one.
         own: its number, where frames have a destination and a source.
+        streams: answers that come until another command stops them.
     """
 
     def __init__(
@@ -143,6 +145,7 @@ class MasterEngine:
         self._broken_echo = EchoBroken(0.0, None, b"", b"")
         self._line = QuietLine(timing.quiet, timing.quiet_limit)
         self._gap = Gap(timing.silence)
+        self.streams = Streams(codec, timing, self._gap)
         self._attempts = Attempts()
         self._state = MasterState.IDLE
         self._outcome: Reply | LinkError | None = None
@@ -227,8 +230,7 @@ class MasterEngine:
         self._outcome = None
         self._answers = None
         self._dialogue = dialogue
-        if self._line.suspect:
-            self._line.await_quiet(now)
+        self._await_quiet(now)
         if self._echo.mode == "auto":
             self._probe.until = 0.0
             self._state = _START_PROBE[IDLE]
@@ -240,6 +242,13 @@ class MasterEngine:
         if self.numbering is not None:
             self.numbering.number(message)
         self.own.put(message)
+
+    def _await_quiet(self, now: float) -> None:
+        """Begin a wait for a quiet line; answers without an end leave no silence to wait for."""
+        if self.streams:
+            self._line.suspect = False
+        elif self._line.suspect:
+            self._line.await_quiet(now)
 
     def _begun(
         self, command: CommandTiming, request: Framed, further: Sequence[Further], node: int | None
@@ -304,6 +313,8 @@ class MasterEngine:
         """Process expired timers."""
         if self._gap.passed(now):
             self._end_frame(now)
+        if self.streams:
+            self._expire_streams(now)
         state = self._state
         if state is WAITING:
             if now >= self._deadline:
@@ -317,6 +328,15 @@ class MasterEngine:
                 self._probed(found=False, now=now)
         elif state is not IDLE and self._line.failed(now):
             self._fail(BadReply, "line never became idle: unsolicited traffic", now)
+
+    def _expire_streams(self, now: float) -> None:
+        for stream in self.streams.expire(now):
+            pending, error = stream.pending, stream.error
+            assert error is not None
+            pending.count.timeouts += 1
+            pending.count.failures += 1
+            self.events.append(Failed(now, pending.node, pending.request, error))
+            self._distrust(now)
 
     def _enough(self, answers: Answers) -> bool:
         """Whether the answers count although the time has passed: it ends them, or no attempt is left."""
@@ -375,6 +395,7 @@ class MasterEngine:
         if not pending.is_answered:
             if self._paced or self._gap.span:
                 self._line.free_at = now + on_wire + command.allowance
+            self._stopped(pending, now + on_wire)
             self._outcome = attempts.reply(None, now)
             self._state = _UNANSWERED[self._state]
             return frame
@@ -479,11 +500,12 @@ class MasterEngine:
         elif not (self._state is WAITING and now >= self._earliest and self._other_reply(event, now)):
             self._stray(event, now)
 
-    def _asked(self, message: Framed) -> Framed | None:
-        """The request that a message may answer, None without one."""
-        if self._state is WAITING and self._pending.from_asked(self._address(message)):
-            return self._pending.request
-        return None
+    def _asked(self, message: Framed) -> Iterator[Framed]:
+        """The requests that a message may answer, the last one first."""
+        node = self._address(message)
+        if self._state is WAITING and self._pending.from_asked(node):
+            yield self._pending.request
+        yield from self.streams.asked_of(lambda pending: pending.from_asked(node))
 
     def _other_reply(self, message: Framed, now: float) -> bool:
         """Handle an answer other than the response; return whether it is one."""
@@ -597,6 +619,11 @@ class MasterEngine:
 
     def _stray(self, message: Framed, now: float) -> None:
         node = self._address(message)
+        if self.streams and (stream := self.streams.take(message, node, now)) is not None:
+            if self.verbose:
+                more = OtherAnswer(now, stream.pending.node, stream.request, message, "more", 1)
+                self.events.append(more)
+            return
         count = self.counters.get(node) or self.counters[None]
         earlier, sent = self._earlier, self._attempts.number > 0
         asked = sent and self._pending.may_be_answered_by(message, node)
@@ -635,13 +662,26 @@ class MasterEngine:
         if pending.command.sizes:
             cut(pending.command.definition, pending.asked, response)
         several: object = response if answers is None else answers.result
+        if answers is not None and self.streams.is_one(pending):
+            several = self.streams.begin(pending, response if answers.items else None, now)
         if self._dialogue is not None and self._dialogue.ended:
             several = tuple(self._dialogue.answers)
         self._outcome = reply = attempts.reply(several, now)
         self._answered(response, now)
+        self._stopped(pending, now)
         if self.verbose:
             event = Answered(now, pending.node, pending.request, response, reply.attempts, reply.elapsed)
             self.events.append(event)
+
+    def _stopped(self, pending: Pending, now: float) -> None:
+        """End the streams that a request has stopped; their last answers may still arrive."""
+        if self.streams and self.streams.stop(pending.request):
+            self._line.distrust(now)
+
+    def _distrust(self, now: float) -> None:
+        """Require a quiet line, if there can be one."""
+        if not self.streams:
+            self._line.distrust(now)
 
     def _answered(self, answer: Framed, now: float) -> None:
         """Note that the node has answered, in whatever way."""
@@ -652,7 +692,7 @@ class MasterEngine:
             self.events.append(self._broken_echo)
             self._echo.forget()
         if self._attempts.number > 1:
-            self._line.distrust(now)  # the answer to an earlier attempt may still arrive
+            self._distrust(now)  # the answer to an earlier attempt may still arrive
         if self._paced and self.codec.encode(answer)[-1:] != self._received[-1:]:
             self._line.free_at = (
                 now + self._byte_time
@@ -670,7 +710,7 @@ class MasterEngine:
             self._echo_missing(pending.count, pending.node, now)
             echo.forget()
         self.events.append(TimedOut(now, pending.node, pending.request, attempts.number))
-        self._line.distrust(now)
+        self._distrust(now)
         if attempts.left:
             self._state = _REPEAT[self._state]
         elif echo.broken:

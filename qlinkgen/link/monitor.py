@@ -29,7 +29,7 @@ from qlinkgen.link.codec import (
 from qlinkgen.link.dialogue import Progress
 from qlinkgen.link.events import Damaged, Stray
 from qlinkgen.link.gaps import Gap
-from qlinkgen.link.many import Answers
+from qlinkgen.link.many import Answers, Stop, is_endless
 from qlinkgen.link.timing import Timing
 from qlinkgen.link.transaction import Accepts
 
@@ -71,8 +71,8 @@ class _Pending:
     """The last request, and its deadline."""
 
     __slots__ = (
-        "answered", "answers", "asked", "at", "command", "deadline", "dialogue", "reported", "request",
-        "sent", "sent_as",
+        "answered", "answers", "asked", "at", "begun", "command", "deadline", "dialogue", "reported",
+        "request", "sent", "sent_as",
     )  # fmt: skip
 
     def __init__(self, command: Command, request: Framed, at: float, deadline: float, *, alone: bool) -> None:
@@ -84,6 +84,8 @@ class _Pending:
         self.deadline = deadline
         self.answers = Answers(command.many, request, alone=alone) if command.many is not None else None
         self.answered = command.response is None
+        #: The first of answers that another command ends was received.
+        self.begun = False
         self.reported = self.answered
         #: The dialogue, None for a request and its response and after the end.
         self.dialogue = Progress(command) if command.steps else None
@@ -145,6 +147,11 @@ class Monitor:
         #: The last request, and before it on a link that of the other side, which asks too.
         self._asking: list[_Pending] = []
         self._askers = 2 if codec.BUS.kind == "link" else 1
+        #: Earlier requests whose answers have no end.
+        self._streams: list[_Pending] = []
+        self._stops = {
+            name: Stop(command, codec) for name, command in codec.COMMANDS.items() if is_endless(command)
+        }
         self._answer_to = answer_to(codec)
         self._gap = Gap(timing.silence)
 
@@ -170,26 +177,34 @@ class Monitor:
         """End the stream."""
         self._sort(self._requests.finish(), self._responses.finish(), now)
         self._gap.due = None
-        for pending in self._asking:
+        for pending in self._waiting:
+            pending.reported = pending.reported or pending.begun  # answers without an end may go on
             pending.deadline = min(pending.deadline, now)
         self.handle_timer(now)
 
     def next_timer(self) -> float | None:
         """Return the deadline of the pending request, or the end of a silence; None without either."""
         return self._gap.before(
-            min((each.deadline for each in self._asking if not each.reported), default=None)
+            min((each.deadline for each in self._waiting if not each.reported), default=None)
         )
+
+    @property
+    def _waiting(self) -> list[_Pending]:
+        """All requests that may be answered, the last one first."""
+        return [*self._asking, *self._streams] if self._streams else self._asking
 
     def handle_timer(self, now: float) -> None:
         """End a frame after a silence that alone does; report a request that was not answered in time."""
         if self._gap.passed(now):
             self._sort(self._requests.finish(), self._responses.finish(), now)
-        for pending in reversed(self._asking):
+        for pending in reversed(self._waiting):
             if not pending.reported and now >= pending.deadline:
                 pending.reported = True
                 answers = pending.answers
                 if answers is None or not (answers.timed and answers.items):  # otherwise that was their end
                     self.heard.append(Unanswered(now, pending.sent))
+        if self._streams:
+            self._streams = [each for each in self._streams if not each.reported]
 
     def _sort(
         self, asking: Sequence[Framed | Fault], answering: Sequence[Framed | Fault], now: float
@@ -207,14 +222,14 @@ class Monitor:
                 self._message(request, response, now)
 
     def _node_asked(self, now: float) -> int | None:
-        waiting = (each for each in self._asking if not each.answered and now < each.deadline)
+        waiting = (each for each in self._waiting if not each.answered and now < each.deadline)
         pending = next(waiting, None)
         return None if pending is None else address_of(pending.request)
 
     def _message(self, request: Framed | None, response: Framed | None, now: float) -> None:
         # Both events are of the same frame, decoded or refused in each direction.
         if response is not None:
-            fitting = [pair for each in self._asking if (pair := self._answer(each, response))]
+            fitting = [pair for each in self._waiting if (pair := self._answer(each, response))]
             for pending, answer in fitting:
                 if not pending.answered and now < pending.deadline:
                     self._replied(pending, answer, now, late=False)
@@ -255,6 +270,9 @@ class Monitor:
         if pending.answered:
             self.heard.append(Stray(now, response, late=True))
             return
+        reply = pending.command.replies.get(type(response))
+        if reply is None or reply.meaning(response) == "done":
+            self._stop(pending.request)
         deadline = self._further_deadline(pending, response, now)
         if deadline is not None:
             pending.deadline = max(pending.deadline, deadline)
@@ -272,6 +290,9 @@ class Monitor:
             return self._further_in_dialogue(pending, pending.dialogue, response, now)
         if reply is not None and reply.meaning(response) == "pending":
             return now + self._timing.patience(pending.command, reply)
+        if pending.command.name in self._stops and type(response) is pending.command.response:
+            pending.begun = reply is None or reply.meaning(response) == "done"
+            return now + self._timing.further(pending.command) if pending.begun else None
         if answers is None or type(response) is not pending.command.response or answers.take(response):
             return None
         fixed = answers.timed or answers.nodes is not None
@@ -305,13 +326,7 @@ class Monitor:
         if command is None:  # a message outside commands: sent by any node, without a response
             self.heard.append(Stray(now, request, late=False))
             return
-        before = next((each for each in self._asking if each.request == request), None)
-        if before is None and len(self._asking) == self._askers:
-            before = self._asking[-1]
-        if before is not None:
-            self._asking.remove(before)
-            if not before.reported:  # the master did not wait for the deadline
-                self.heard.append(Unanswered(now, before.sent))
+        before = self._replaced(request, now)
         repeat = before is not None and not before.answered and before.request == request
         unanswerable = not addresses_that_answer(command, request, self._codec.BUS)
         to_all = address_of(request) == self._codec.BUS.broadcast
@@ -324,9 +339,33 @@ class Monitor:
                 pending.deadline += self._timing.duration(command.many)
             pending.deadline += pending.answers.further * self._timing.deadline(command, 0)
         pending.answered = pending.reported = unanswerable
+        if unanswerable:
+            self._stop(request)
         if pending.dialogue is not None:
             pending.reported = pending.dialogue.sends
         self.heard.append(Asked(now, request, repeat, self._codec.encode(request)))
+
+    def _replaced(self, request: Framed, now: float) -> _Pending | None:
+        """Remove the request before another one, and return it; None if it stays."""
+        before = next((each for each in self._asking if each.request == request), None)
+        if before is None and len(self._asking) == self._askers:
+            before = self._asking[-1]
+        if before is None:
+            return None
+        self._asking.remove(before)
+        if before.begun and not before.answered and before.request != request:
+            self._streams.append(before)
+        elif not before.reported:  # the master did not wait for the deadline
+            self.heard.append(Unanswered(now, before.sent))
+        return before
+
+    def _stop(self, request: Framed) -> None:
+        """End the answers that a request has stopped."""
+        for each in self._waiting if self._stops else ():
+            stop = self._stops.get(each.command.name)
+            if stop is not None and stop.by(request, each.request):
+                each.answered = each.reported = True
+        self._streams = [each for each in self._streams if not each.answered]
 
     def _continued(self, request: Framed, now: float) -> bool:
         """Note a later frame of a dialogue; return whether it is one."""

@@ -168,9 +168,9 @@ class PeerEngine:
         if not self._open:  # a late answer is not among requests, which do not disturb the wait for silence
             line.quiet_at = self._calm
 
-    def answer(self, request: Framed, response: Framed | Sequence[Framed], now: float) -> None:
+    def answer(self, request: Framed, response: Framed | Sequence[Framed], now: float) -> bool:
         """Send the answer to a request that its handler did not answer; see `SlaveEngine.answer`."""
-        self.slave.answer(request, response, now)
+        return self.slave.answer(request, response, now)
 
     def bytes_to_send(self, now: float) -> bytes:
         """Return the bytes that the driver has to write now."""

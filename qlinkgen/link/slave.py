@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from typing import Any, Literal, Protocol, cast
 
 from qlinkgen.link.codec import (
@@ -23,6 +23,7 @@ from qlinkgen.link.gaps import Gap, silence_of
 from qlinkgen.link.many import nodes_asked
 from qlinkgen.link.numbering import numbering_of, repeat, repeated_of
 from qlinkgen.link.slave_dialogue import PENDING, Answers, Handling, Refusal, SlaveDialogue
+from qlinkgen.link.slave_streams import Flows
 from qlinkgen.link.unknown import unknown_requests
 
 __all__ = ["PENDING", "Node", "Refusal", "SlaveCounters", "SlaveEngine"]
@@ -37,9 +38,12 @@ class Node(Protocol):
     #: Address of the node. A request may change it.
     number: int
 
-    def handle(self, request: Any, now: float) -> Answers | Handling:  # Any: a message of its own protocol
+    def handle(  # Any: a message of its own protocol
+        self, request: Any, now: float
+    ) -> Answers | Iterable[Message] | Handling:
         """Execute a request; return its answer, a list of several, or None to send nothing.
 
+        For answers without an end it may return an iterator, which is asked for each when the line is free.
         A dialogue is a generator: it yields the answers to the request, gets the next frame of the
         master as the value of the `yield`, and so on. It returns the answers to the last frame.
         """
@@ -147,6 +151,7 @@ class SlaveEngine:
             kind for each in self._dialogues.values() for who, kind, _ in each.steps if who == "send"
         }
         self._dialogue: SlaveDialogue | None = None
+        self._flows = Flows(codec, self._checked)
         self._decoder = decoder or codec.StreamDecoder("request")
         self._turnaround = turnaround
         speed = baud or codec.BUS.baud
@@ -217,20 +222,26 @@ class SlaveEngine:
         if address is not None and address == self._broadcast:
             self.counters.broadcasts += 1
             self._leave()
-            response = self._handled(request, now)
+            response = self._begun(request, self._handled(request, now))
             if not self._answering[type(request)]:
                 return
         else:
             self.counters.requests += 1
             handled = self._handled if not self._dialogues else self._in_dialogue
-            response = handled(request, now)
+            response = self._begun(request, handled(request, now))
         self._request = request
         self._in_turn = before > 0
+        if self._flows and self._flows.next():
+            self._due = max(self._due, now + self._turnaround)
         if response is not None and response is not PENDING:
             self._queue(request, response, now)
             inserted = self._encode(request)[-1:] != self._last
             self._due = now + self._turnaround + (self._byte_time if inserted else 0.0)
             self._due += self._turns(request, before)
+
+    def _begun(self, request: Framed, response: Answers) -> Answers:
+        """Begin or stop answers without an end; return what is sent once."""
+        return self._flows.handled(request, response) if self._flows else response
 
     def _before(self, request: Framed) -> int | None:
         """The number of nodes that answer before this one, None if it is not among those asked."""
@@ -270,8 +281,7 @@ class SlaveEngine:
             self._dialogue = dialogue = SlaveDialogue(command, request, handling)
             return dialogue.begin()
         self._dialogue = SlaveDialogue(command, request, None)
-        at_once: Answers = handling
-        return at_once
+        return cast("Answers", handling)  # an iterator only of answers without an end
 
     def _leave(self) -> None:
         if self._dialogue is not None:
@@ -303,6 +313,11 @@ class SlaveEngine:
         self._await_next(self._further, now)
         self._answer = self._further.pop(0) if several else b""
 
+    def _checked(self, request: Framed, response: Message) -> bytes:
+        """Encode one of several answers without an end."""
+        self._check(request, response)
+        return self._encoded(request, response)
+
     def _encoded(self, request: Framed, response: Message) -> bytes:
         repeat(self._repeated, request, response)
         if self.numbering is not None:
@@ -330,13 +345,21 @@ class SlaveEngine:
         except Refusal as refusal:
             return refusal.reply
 
-    def answer(self, request: Framed, response: Message | Sequence[Message], now: float) -> None:
-        """Send the answer to a request that its handler did not answer; too late after another request."""
-        if request is self._request:
+    def answer(self, request: Framed, response: Message | Sequence[Message], now: float) -> bool:
+        """Send the answer to a request that its handler did not answer; return False after another request.
+
+        Answers without an end are given one by one, or several at once, until another command stops them.
+        """
+        several: Sequence[Message] = response if isinstance(response, list | tuple) else (response,)
+        if self._flows and self._flows.add(request, several):
+            self._due = max(self._due, now)
+        elif request is self._request and not self._flows.is_one(request):
             self._queue(request, response, now)
             self._due = max(self._due, now)
         else:
             self.counters.replaced += 1
+            return False
+        return True
 
     def bytes_to_send(self, now: float) -> bytes:
         """Return the answer if it is due."""
@@ -344,10 +367,13 @@ class SlaveEngine:
             self._sort(self._decoder.finish(), now)
         if self._unknown is not None and self._unknown.due is not None and now >= self._unknown.due:
             self._refuse(self._unknown.silent(self._node), now)
-        answer = self._answer
+        answer = self._answer or (self._flows.next() if self._flows else b"")
         if not answer or now < self._due:
             return b""
-        self._answer = self._further.pop(0) if self._further else b""
+        if self._answer:
+            self._answer = self._further.pop(0) if self._further else b""
+        else:
+            self._flows.sent()
         pause = max(self._turnaround, self._gap.span)
         self._due = now + len(answer) * self._byte_time + pause
         self.counters.answers += 1
@@ -358,6 +384,6 @@ class SlaveEngine:
     def next_timer(self) -> float | None:
         """Return when an answer is due, or the line has been idle where that matters; None otherwise."""
         silence = self._gap.before(None if self._unknown is None else self._unknown.due)
-        if not self._answer:
+        if not self._answer and not (self._flows and self._flows.next()):
             return silence
         return self._due if silence is None else min(self._due, silence)

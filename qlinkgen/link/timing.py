@@ -115,6 +115,13 @@ class Timing:
         """Return the time in which several answers come, if that is their end."""
         return self._time(*many.within) if many.within is not None else 0.0
 
+    def further(self, command: Command) -> float:
+        """Return the time from one answer to the next, if another command stops them."""
+        within: StepSpan | None = getattr(command.many, "next_within", None)
+        if within is None:
+            return self.deadline(command, 0)
+        return self.on_wire(_longest_answer(command)) + self._time(*within) + self.host_slack + self.silence
+
     def step(self, step: tuple[str, type[Framed], StepSpan | None]) -> float:
         """Return the time until a frame of a dialogue is complete, after the one before it."""
         _, message, within = step
@@ -150,7 +157,8 @@ class Timing:
     def worst_case(self, command: Command, attempts: int | None = None) -> float:
         """Return the longest duration of a call in seconds, for any traffic on the line.
 
-        Infinite for several answers whose end the device decides. Functions that make frames take no time.
+        Infinite for several answers whose end the device decides; the duration to the first one if another
+        command stops them. Functions that make frames take no time.
 
         The first term is the delay before the first attempt: an aborted request that may still be answered (a
         broadcast that is still being sent takes less), or the probe for an echo, with a quiet line before it.

@@ -29,7 +29,8 @@ Question = Framed | Packet | Dialogue
 class Reply(NamedTuple):
     """The outcome of a successful transaction."""
 
-    #: None for a request without a response, a list of several answers, a tuple of those in a dialogue.
+    #: None for a request without a response, a list of several answers, a tuple of those in a dialogue, a
+    #: `Stream` of those that another command stops.
     response: Any  # of the request's response class; the calls of a generated bus module have its type
     #: Number of transmissions of the request.
     attempts: int

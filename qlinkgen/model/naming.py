@@ -25,16 +25,16 @@ _IN_FUNCTIONS = frozenset(
 )
 #: Attributes of the classes of calls and handlers, and types of arguments.
 _IN_CALLS = frozenset(
-    """ask ask_any ask_each ask_many ask_steps tell handle number axis bool bytes dict float int list str
-    tuple type""".split()  # noqa: SIM905
+    """ask ask_any ask_each ask_many ask_steps ask_stream tell handle number axis bool bytes dict float int
+    list str tuple type""".split()  # noqa: SIM905
 )
 #: Classes, constants and imports of a codec, and constants in the body of a message class.
 _IN_MODULE = frozenset(
     """Message Request Response StreamDecoder Command Counters Fault CodecError EncodeError DecodeError
     Codec Bus OpenEnum BaseMessage ArrayRule BytesRule ConstantRule CountRule IntRule MaskRule
     ScaledRule TextRule RecordRule RecordsRule BaseRecord MaybeRule Misplaced NEW Rule OutOfRange Scale
-    DecimalScale Marking Struct Decimal Self Any Callable Generator Sequence BytesLike ClassVar Final
-    Literal LayoutError EachOf
+    DecimalScale Marking Struct Decimal Self Any Callable Generator AsyncGenerator Iterable Sequence
+    BytesLike ClassVar Final Literal LayoutError EachOf UntilStopped
     Checksum BUS COMMANDS MESSAGES RECORDS MARKING REFUSALS UNREAD UNREADABLE NAME ID FIELDS RULES
     ADDRESS EMPTY CHECKED""".split()  # noqa: SIM905
 ) | frozenset(dir(builtins))
@@ -99,7 +99,7 @@ _C_LOCALS = frozenset(
     listener frame checked request response body buffer start count raw sum crc payload_size
     payload_capacity total trailer covered head place broadcast context byte at direction
     parts received size_t block out turn due step texts length left found ended used extra
-    defaults seeds before answers""".split()  # noqa: SIM905
+    defaults seeds before answers streaming""".split()  # noqa: SIM905
 )
 #: Members of a table of handlers other than functions.
 _C_HANDLERS = frozenset(
@@ -113,6 +113,7 @@ _C_HANDLERS = frozenset(
         "parts",
         "received",
         "replying",
+        "streaming",
         "turn",
         "due",
     }

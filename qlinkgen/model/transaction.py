@@ -151,8 +151,21 @@ class ByEach:
     by: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class ByCommand:
+    """Answers come until another command stops them.
+
+    ``within`` is the time limit from one answer to the next, None for that of the first. ``repeats`` are
+    values of the stopping request that repeat the value of the same name in the request.
+    """
+
+    command: str
+    within: Allowance | None = None
+    repeats: tuple[str, ...] = ()
+
+
 #: The end of several answers to one request.
-Many = ByCount | ByField | ByReply | ByTime | ByEach
+Many = ByCount | ByField | ByReply | ByTime | ByEach | ByCommand
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,6 +228,11 @@ class Command:
             return {}
         own = {each.value: each.of for each in self.echoes if each.answer == answer.name}
         return {**{name: name for name in answer.echoed}, **own}
+
+    @property
+    def stopped(self) -> ByCommand | None:
+        """The command that stops the answers, None for other commands."""
+        return self.many if isinstance(self.many, ByCommand) else None
 
     @property
     def meant(self) -> tuple[Reply, ...]:

@@ -9,7 +9,7 @@ from typing import Literal
 from qlinkgen.model.fields import Layout, layouts_of
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.transaction import ByReply, Command
+from qlinkgen.model.transaction import ByCommand, ByReply, Command
 from qlinkgen.model.types import Array, Enum, Flags, Scalar
 
 Role = Literal["both", "master", "slave"]
@@ -37,6 +37,7 @@ def kept(protocol: Protocol, options: Options) -> tuple[Message, ...]:
     """The selected messages, in schema order."""
     wanted = set(options.only)
     commands = [command for command in protocol.commands if command.name in wanted or _asks(command, wanted)]
+    wanted |= {command.stopped.command for command in commands if command.stopped}
     wanted |= {message.name for command in commands for message in command.messages}
     if any(protocol.is_asked(m) and m.name in wanted for m in protocol.messages):
         wanted |= {message.name for message in protocol.messages if message.carries}
@@ -45,7 +46,7 @@ def kept(protocol: Protocol, options: Options) -> tuple[Message, ...]:
 
 def _asks(command: Command, wanted: Collection[str]) -> bool:
     """Whether only its request is selected, but a master cannot send it without knowing what follows."""
-    follows = bool(command.steps) or isinstance(command.many, ByReply)
+    follows = bool(command.steps) or isinstance(command.many, ByReply | ByCommand)
     return follows and command.request.name in wanted
 
 

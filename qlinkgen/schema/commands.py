@@ -27,6 +27,7 @@ from qlinkgen.schema.sides import EITHER, asker_of, check_sides
 from qlinkgen.schema.sizes import Sized, sized
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.steps import Asked, StepBuilder, names_response
+from qlinkgen.schema.stopping import stopped
 
 
 def build_bus(file: SchemaFile, report: Reporter) -> Bus:
@@ -93,6 +94,7 @@ class CommandBuilder:
         for name, spec in self._file.commands.items():
             self._command(name, spec, ("commands", name))
         self._replies.check_meant()
+        self.commands = stopped(self.commands, self._frame, self._report)
         self.messages += self._singles.values()
         self._carry()
         if not self._file.commands and not self._file.messages:
@@ -189,7 +191,13 @@ class CommandBuilder:
             self._report.error("bad-many", place, what, "remove it", of_key=True, needs=needs)
             return None
         builder = ManyBuilder(
-            request, response, replies, self._report, address=self._address_name, addressing=addressing
+            request,
+            response,
+            replies,
+            self._report,
+            address=self._address_name,
+            addressing=addressing,
+            commands=self._file.commands,
         )
         return builder.build(spec.many, place)
 

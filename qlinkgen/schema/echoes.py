@@ -142,7 +142,7 @@ def _fault(field: Field, request: Message, parts: Mapping[str, PartBits | Value]
         return f"the request has no field {name!r} to repeat", hint
     if isinstance(asked, PartBits):
         return _part_fault(field, asked, request)
-    if not _holds(field.type, asked.type):
+    if not holds(field.type, asked.type):
         return f"{field.name} cannot hold every {name} of the request", "give both the same type"
     return None
 
@@ -178,7 +178,7 @@ def _has_float(kind: FieldType) -> bool:
     return isinstance(number, Scalar) and isinstance(number.meaning, Float)
 
 
-def _holds(kind: FieldType, other: FieldType) -> bool:
+def holds(kind: FieldType, other: FieldType) -> bool:
     """Whether a type can hold every value of another."""
     match kind:
         case Blob():
@@ -188,7 +188,7 @@ def _holds(kind: FieldType, other: FieldType) -> bool:
         case Array():
             return (
                 isinstance(other, Array)
-                and _holds(kind.item, other.item)
+                and holds(kind.item, other.item)
                 and _longer(kind.length, other.length)
             )
         case Record():
@@ -200,7 +200,7 @@ def _holds(kind: FieldType, other: FieldType) -> bool:
             if not isinstance(other, Bits) or len(kind.members) != len(other.members):
                 return False
             pairs = zip(kind.members, other.members, strict=True)
-            return all(a.name == b.name and _holds(a.type, b.type) for a, b in pairs)
+            return all(a.name == b.name and holds(a.type, b.type) for a, b in pairs)
         case Scalar():
             if not isinstance(other, Scalar):
                 return False

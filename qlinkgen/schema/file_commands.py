@@ -216,15 +216,19 @@ def _each_form(value: object) -> object:
 
 
 class ManySpec(FileMapping):
-    """The end of several answers to one request: exactly one of its keys."""
+    """The end of several answers to one request: exactly one of its keys, but for what is said of two."""
 
     count: Annotated[int | str, BeforeValidator(_count_form)] | None = Field(
         default=None, description="Number of answers: 8, or request.FIELD"
     )
     until: str | dict[str, str | StrictInt] | None = Field(
-        default=None, description="{FIELD: value} of the last answer, or the name of a reply after it"
+        default=None,
+        description="{FIELD: value} of the last answer, a reply after it, or a command that stops them",
     )
-    within: Time | None = Field(default=None, description="Time in which answers come")
+    within: Time | None = Field(
+        default=None,
+        description="Time in which answers come; with a command that stops them: from one answer to the next",
+    )
     each: Annotated[str, BeforeValidator(_each_form)] | None = Field(
         default=None,
         description="Each node in a list of the request answers: request.LIST or request.LIST.FIELD",

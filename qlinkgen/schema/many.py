@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 from qlinkgen.model.fields import Field, FieldType, Records, values_of
 from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import (
     Addressing,
     Allowance,
+    ByCommand,
     ByCount,
     ByEach,
     ByField,
@@ -40,18 +41,26 @@ class ManyBuilder:
         *,
         address: str,
         addressing: Addressing,
+        commands: Collection[str],
     ) -> None:
-        """The end may refer to each of these messages, and to the part with the address, "" without one."""
+        """Make a builder.
+
+        The end may refer to each of these messages, to the part with the address, "" without one, and to the
+        names of ``commands``.
+        """
         self._request = request
         self._response = response
         self._replies = {reply.name: reply.message for reply in replies}
         self._report = report
         self._address = address
         self._addressing = addressing
+        self._commands = commands
 
     def build(self, spec: ManySpec, path: Path) -> Many | None:
         """The end that a command states, None if it is wrong."""
         given = [key for key in ("count", "until", "within", "each") if getattr(spec, key) is not None]
+        if given == ["until", "within"] and self._is_command(spec.until):
+            given.remove("within")
         if len(given) != 1:
             what = f"the answers have {len(given)} ends" if given else "the answers have no end"
             self._error(path, what, "write one of count, until, within and each")
@@ -64,13 +73,17 @@ class ManyBuilder:
                 "only answers of each node in a list have by",
                 "write each: request.LIST, or remove it",
             )
-        if spec.within is not None:
-            return ByTime(Allowance(spec.within.byte_times, spec.within.seconds))
+        within = Allowance(spec.within.byte_times, spec.within.seconds) if spec.within else None
+        if isinstance(spec.until, str):
+            return self._named(spec.until, within, (*path, "until"))
+        if within is not None:
+            return ByTime(within)
         if spec.count is not None:
             return self._count(spec.count, (*path, "count"))
-        if isinstance(spec.until, str):
-            return self._reply(spec.until, (*path, "until"))
         return self._field(spec.until or {}, (*path, "until"))
+
+    def _is_command(self, until: object) -> bool:
+        return isinstance(until, str) and until in self._commands and until not in self._replies
 
     def _error(self, path: Path, what: str, hint: str) -> None:
         self._report.error(_RULE, path, what, hint)
@@ -122,11 +135,15 @@ class ManyBuilder:
             return None
         return ByEach(name, most, key, by) if kind else None
 
-    def _reply(self, name: str, path: Path) -> Many | None:
+    def _named(self, name: str, within: Allowance | None, path: Path) -> Many | None:
+        """A reply after the answers, or a command that stops them."""
         if name in self._replies:
             return ByReply(self._replies[name])
-        hint = did_you_mean(name, self._replies, "write {FIELD: value}, or the name of one of the replies")
-        self._error(path, f"the command has no reply {shown(name)}", hint)
+        if name in self._commands:
+            return ByCommand(name, within)
+        known = [*self._replies, *self._commands]
+        hint = did_you_mean(name, known, "write {FIELD: value}, or the name of a reply or command")
+        self._error(path, f"unknown reply or command {shown(name)}", hint)
         return None
 
     def _field(self, until: Mapping[str, str | int], path: Path) -> Many | None:

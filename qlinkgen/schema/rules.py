@@ -378,7 +378,8 @@ _ALL = (
     ),
     Rule(
         "bad-many",
-        "Several answers to a request have one end: a number of them, a field, a reply, a time or a list.",
+        "Several answers to a request have one end: a number of them, a field, a reply, a time, a list or "
+        "another command.",
         "Without an end a master would wait for a further answer after the last one.",
     ),
     Rule(

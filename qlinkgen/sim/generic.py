@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+import itertools
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from qlinkgen.link.asked import answer_to
 from qlinkgen.link.codec import Codec, Command, Echoes, Framed, Many, Message, is_message
-from qlinkgen.link.many import nodes_asked
+from qlinkgen.link.many import is_endless, nodes_asked
 from qlinkgen.link.slave_dialogue import Handling
 from qlinkgen.plan import Plan
 from qlinkgen.plan.codec import Codec as Interpreter
@@ -62,7 +63,7 @@ class GenericNode:
         self,
         request: Framed,
         now: float,  # noqa: ARG002  # the interface of nodes
-    ) -> Message | list[Message] | Handling | None:
+    ) -> Message | list[Message] | Iterator[Message] | Handling | None:
         """Return the response or responses to a request; None if the command has none or is unknown."""
         self.requests += 1
         command = self._commands.get(type(request))
@@ -77,8 +78,8 @@ class GenericNode:
 
     def _several(
         self, command: Command, many: Many, request: Framed, values: dict[str, object]
-    ) -> list[Message]:
-        """Return as few answers as there may be."""
+    ) -> list[Message] | Iterator[Message]:
+        """Return as few answers as there may be; those without an end all the time."""
         assert command.response is not None
         if (nodes := nodes_asked(many, request)) is not None:
             by: str = getattr(many, "by", "")
@@ -89,6 +90,8 @@ class GenericNode:
             values = {**values, field: first}
         count = int(getattr(request, many.counted_by)) if many.counted_by else many.count
         one = self._answer(command.response, request, command.echoes, values)
+        if is_endless(command):
+            return itertools.repeat(one)
         if many.reply is None:
             return [one] * (count or 1)
         return [one, self._answer(many.reply, request, command.replies[many.reply].echoes, {})]

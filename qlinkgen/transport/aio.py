@@ -11,12 +11,13 @@ import threading
 from collections.abc import AsyncGenerator, Callable
 from contextlib import ExitStack, aclosing, suppress
 from types import TracebackType
-from typing import Self, TypeVar, assert_never
+from typing import Any, Self, TypeVar, assert_never
 
+from qlinkgen.errors import PortLost
 from qlinkgen.link.events import Event
 from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Report, Runner, Tell
 from qlinkgen.link.transaction import Question, Reply
-from qlinkgen.transport.conversation import Asker, MasterDriver, conversation
+from qlinkgen.transport.conversation import Asker, MasterDriver, conversation, stream_of
 from qlinkgen.transport.port import Port
 
 _Result = TypeVar("_Result")
@@ -59,6 +60,31 @@ class AsyncMaster(MasterDriver):
             finally:
                 steps.close()
                 self._report()
+
+    async def stream(self, request: Question, *, attempts: int | None = None) -> AsyncGenerator[Any, None]:
+        """Send a request whose answers another command stops, and return an iterator over them.
+
+        As `BlockingMaster.stream`. Leave it with `contextlib.aclosing`, so that the stopping command is sent
+        there and then.
+        """
+        stream = stream_of(await self.transact(request, attempts=attempts))
+        try:
+            while stream is not None:
+                while stream.answers:
+                    yield stream.answers.popleft()
+                if stream.ended:
+                    break
+                async with self._lock:
+                    self._heard(stream, await read(self.port, self._wait_for(stream)))
+                    self._report()
+        except PortLost:
+            stream = None
+            raise
+        finally:
+            if stream is not None and not stream.ended:
+                await self.transact(stream.stop)
+        if stream is not None and stream.error is not None:
+            raise stream.error
 
     async def run(
         self, procedure: Procedure[Outcome], progress: Callable[[Report], None] | None = None

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
 from types import TracebackType
-from typing import Self, assert_never
+from typing import Any, Self, assert_never
 
+from qlinkgen.errors import PortLost
 from qlinkgen.link.events import Event
 from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Report, Runner, Tell
 from qlinkgen.link.transaction import Question, Reply
-from qlinkgen.transport.conversation import Asker, MasterDriver, conversation
+from qlinkgen.transport.conversation import Asker, MasterDriver, conversation, stream_of
 from qlinkgen.transport.forking import tell_of_forks
 from qlinkgen.transport.port import Port
+
+#: Seconds in which other threads get the port, while one waits for the answers of a stream.
+_LET_OTHERS = 0.0005
 
 
 class BlockingMaster(MasterDriver):
@@ -57,6 +62,50 @@ class BlockingMaster(MasterDriver):
                 return reply
             finally:
                 steps.close()
+                self._report()
+                self._asking = outer
+
+    def stream(self, request: Question, *, attempts: int | None = None) -> Generator[Any]:
+        """Send a request whose answers another command stops, and return an iterator over them.
+
+        The request is sent when the first answer is asked for. Closing the iterator sends the stopping
+        command, which the caller may also send itself; so may it other requests, where the line allows it.
+
+        Raises:
+            NoReply: no reply was received, or no further one in time.
+            Refused: the device refused the request, or ended the answers so.
+            PortLost: the port was lost.
+            TypeError: the answers of the request have an end.
+        """
+        stream = stream_of(self.transact(request, attempts=attempts))
+        try:
+            while stream is not None:
+                while stream.answers:
+                    yield stream.answers.popleft()
+                if stream.ended:
+                    break
+                with self._hold():
+                    data = self.port.read(self._wait_for(stream))
+                    self._heard(stream, data)
+                if not data:
+                    self.port.sleep(_LET_OTHERS)
+        except PortLost:
+            stream = None
+            raise
+        finally:
+            if stream is not None and not stream.ended:
+                self.transact(stream.stop)
+        if stream is not None and stream.error is not None:
+            raise stream.error
+
+    @contextmanager
+    def _hold(self) -> Iterator[None]:
+        """Hold the port, and report events."""
+        with self._lock:
+            outer, self._asking = self._asking, threading.get_ident()
+            try:
+                yield
+            finally:
                 self._report()
                 self._asking = outer
 

@@ -9,6 +9,7 @@ from typing import Protocol
 from qlinkgen.link.codec import Module
 from qlinkgen.link.counters import LinkCounters
 from qlinkgen.link.events import Event
+from qlinkgen.link.streams import Stream
 from qlinkgen.link.timing import Timing
 from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.transport.port import Ability, Port
@@ -22,6 +23,8 @@ WAKE_UP = 0.004
 OTHER_PROGRAM = 0.02
 #: Most reads that discard bytes received since the last transaction; the deadlines handle an endless stream.
 STALE_READS = 16
+#: Longest read of a driver that awaits the answers of a stream; others may ask between two of them.
+PIECE = 0.005
 
 
 def host_slack(port: Port) -> float:
@@ -120,9 +123,28 @@ class MasterDriver:
             while events:
                 self._on_event(events.popleft())
 
+    def _heard(self, stream: Stream, data: bytes) -> None:
+        """Process what was received for a stream, or that nothing was."""
+        now = self.port.now()
+        if data:
+            self.engine.receive(data, now)
+        if now >= stream.next_timer():
+            self.engine.handle_timer(now)
+
+    def _wait_for(self, stream: Stream) -> float:
+        """Return the timeout of a read for a stream."""
+        return min(PIECE, max(0.0, stream.next_timer() - self.port.now()))
+
     def close(self) -> None:
         """Close the port."""
         self.port.close()
+
+
+def stream_of(reply: Reply) -> Stream | None:
+    """Return the stream that a transaction has begun; None if it was a request without a response."""
+    if reply.response is not None and type(reply.response) is not Stream:
+        raise TypeError("the answers of the request have an end; use transact")
+    return reply.response
 
 
 def conversation(

@@ -7,7 +7,7 @@ thread or task. Handlers are called wherever bytes are read, and must not send r
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 
 from qlinkgen.link.transaction import Question, Reply
@@ -27,6 +27,11 @@ class BlockingPeer(BlockingMaster):
         """Send a request; see `BlockingMaster.transact`."""
         with self._turn():
             return super().transact(request, attempts=attempts, trial=trial)
+
+    @contextmanager
+    def _hold(self) -> Iterator[None]:
+        with self._turn(), super()._hold():
+            yield
 
     def serve(self, stop: Callable[[], bool]) -> None:
         """Answer requests of the other side until `stop()` is true.

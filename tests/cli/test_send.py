@@ -311,6 +311,18 @@ def test_a_dialogue() -> None:
         )
 
 
+def test_answers_until_they_are_stopped() -> None:
+    schema = str(SCHEMAS / "answers.yaml")
+    with simulated(schema, "--nodes", "3") as (path, _):
+        done = call("send", path, schema, "observe", "--node", "3", "number=5", "--count", "3", *CALM)
+        told = {"message": "observe.response", "node": 3, "fields": {"value": 0}}
+        assert (done.returncode, done.stderr) == (0, "")
+        assert objects(done.stdout) == [told] * 3
+        done = call("send", path, schema, "clear", "--node", "3", "number=5", "--count", "3", *CALM)
+        assert done.returncode == 2
+        assert "--count requires endless answers; clear.request has none: omit it" in done.stderr
+
+
 def test_an_answer_of_each_node() -> None:
     schema = str(SCHEMAS / "answers.yaml")
     with simulated(schema, "--nodes", "3,5") as (path, _):

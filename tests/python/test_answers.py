@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ PACKAGE = "answers_of_the_tests"
 PROGRAM = f"""
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import AsyncGenerator, Generator, Iterator
 from typing import Any, assert_type
 
 from {PACKAGE} import answers as codec
@@ -42,6 +43,11 @@ class Slave(bus.SlaveHandlers):
     ) -> list[codec.LogResponse | codec.LogFault | codec.Busy | codec.LogEnd]:
         return [codec.LogResponse(node=self.number, entry=1), codec.LogEnd(node=self.number)]
 
+    def observe(
+        self, request: codec.ObserveRequest, now: float
+    ) -> Iterator[codec.ObserveResponse]:
+        return (codec.ObserveResponse(node=self.number, value=value) for value in range(9))
+
     def transfer(
         self, request: codec.TransferRequest, now: float
     ) -> Generator[codec.Ack, Any, codec.TransferWritten]:
@@ -56,6 +62,9 @@ def sync(calls: bus.MasterCalls, node: bus.NodeCalls) -> None:
     assert_type(node.log(number=1), list[codec.LogResponse])
     assert_type(node.clear(number=1), codec.Ack)
     assert_type(calls.gather(0, number=1, nodes=[3, 4]), dict[int, codec.GatherResponse | None])
+    assert_type(calls.observe(3, number=1), Generator[codec.ObserveResponse])
+    for each in node.observe(number=1):
+        assert_type(each, codec.ObserveResponse)
     place = codec.TransferPlace(node=3, start=1)
     told = calls.transfer(3, number=1, place=place, block=lambda _: codec.TransferBlock(node=3, data=b"1"))
     assert_type(told, tuple[codec.Ack, codec.Ack, codec.TransferWritten])
@@ -63,6 +72,7 @@ def sync(calls: bus.MasterCalls, node: bus.NodeCalls) -> None:
 
 async def asynchronous(calls: bus.AsyncMasterCalls) -> None:
     assert_type(await calls.find(0, number=1), list[codec.FindResponse])
+    assert_type(calls.observe(3, number=1), AsyncGenerator[codec.ObserveResponse])
 """
 
 
@@ -97,6 +107,10 @@ def transferring(codec: Any, request: Any) -> Any:
         raise Refusal(codec.TransferFault(node=3, number=request.number, reason=1))
     block = yield codec.Ack(node=3)
     return codec.TransferWritten(node=3, number=request.number, size=place.start + len(block.data))
+
+
+def measured(codec: Any) -> Iterator[Any]:
+    return (codec.ObserveResponse(node=3, value=value) for value in range(1000))
 
 
 def slave_of(codec: Any, calls: Any) -> Any:
@@ -135,6 +149,8 @@ def slave_of(codec: Any, calls: Any) -> Any:
             return [codec.FindResponse(node=self.number, serial=1000 + self.number)]
 
         gather = staticmethod(lambda request, now: codec.GatherResponse(node=3, value=7))
+        observe = staticmethod(lambda request, now: measured(codec))
+        cease = staticmethod(lambda request, now: codec.Ack(node=3 if request.number == 4 else 9))
         transfer = staticmethod(lambda request, now: transferring(codec, request))
 
     return Slave(3)
@@ -149,7 +165,7 @@ def test_a_slave_refuses_what_it_does_not_support(modules: tuple[Any, Any]) -> N
 
 def test_calls_and_handlers(modules: tuple[Any, Any]) -> None:
     codec, calls = modules
-    wire = Wire(baud=19200)
+    wire = Wire(baud=19200, collisions=False)
     slave = slave_of(codec, calls)
     wire.attach(SlaveEngine(codec, slave, turnaround=0.001), "node 3")
     master = BlockingMaster(MasterEngine(codec, Timing.of(codec, host_slack=0.002)), VirtualPort(wire))
@@ -159,6 +175,9 @@ def test_calls_and_handlers(modules: tuple[Any, Any]) -> None:
             return master.transact(request).response
 
         ask_each = ask_many = ask_any = ask
+
+        def ask_stream(self, request: Any, _: Any) -> Any:
+            return master.stream(request)
 
         def ask_steps(self, request: Any, further: Any) -> Any:
             return master.transact(Dialogue(request, further)).response
@@ -176,6 +195,10 @@ def test_calls_and_handlers(modules: tuple[Any, Any]) -> None:
     assert [each.entry for each in pump.log(3, number=3)] == [0, 1, 2]
     assert [each.serial for each in pump.find(0, number=1)] == [1003]
     assert pump.gather(0, number=1, nodes=[5, 3]) == {5: None, 3: codec.GatherResponse(node=3, value=7)}
+    values = pump.observe(3, number=4)
+    assert [next(values).value for _ in range(5)] == [0, 1, 2, 3, 4]
+    values.close()
+    assert not master.engine.streams  # type: ignore[attr-defined]
     block = codec.TransferBlock(node=3, data=b"123")
     told = pump.transfer(3, number=1, place=codec.TransferPlace(node=3, start=5), block=lambda _: block)
     assert told == (codec.Ack(node=3), codec.Ack(node=3), codec.TransferWritten(node=3, number=1, size=8))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from qlinkgen.backends.c.echoes import of_reply, of_response
 from qlinkgen.backends.c.framing import Address, Expected, Function, expected
@@ -43,6 +44,7 @@ class SlaveEntry:
         initial: statements for the response, beyond its defaults, before the function is called.
         turn: its number in a dialogue, 0 if it begins a transaction; ``following`` is that of the next frame.
         listed: the nodes in it, each of which sends an answer; None if it has no list.
+        begins: the flag of its answers without an end, "" if they have one; ``stops`` are those that it ends.
     """
 
     name: str
@@ -63,6 +65,16 @@ class SlaveEntry:
     turn: str
     following: str
     listed: Listed | None
+    begins: str
+    stops: list[str]
+
+
+class Streaming(NamedTuple):
+    """The flag of answers without an end, their command, and the one that stops them."""
+
+    name: str
+    command: Command
+    stop: Command
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +170,7 @@ def slave_entries(
     *,
     address: str,
     reject: str,
+    streams: Sequence[Streaming] = (),
 ) -> list[SlaveEntry]:
     """Requests to a slave, in schema order.
 
@@ -187,6 +200,7 @@ def slave_entries(
                     address=address,
                     replies=replies,
                     exchange=exchange,
+                    streaming=streams,
                 )
             )
     return entries
@@ -224,6 +238,7 @@ def _entry(
     address: str,
     replies: list[str],
     exchange: Exchange | None,
+    streaming: Sequence[Streaming],
 ) -> SlaveEntry:
     command = exchange.command if exchange else None
     following = exchange.following if exchange else None
@@ -250,7 +265,23 @@ def _entry(
         turn=turn_name(names, message) if exchange and exchange.turn else "",
         following=turn_name(names, following) if following else "",
         listed=_listed(exchange.command) if exchange and answer else None,
+        begins=next((name for name, command, _ in streaming if answer and command.request is message), ""),
+        stops=[name for name, _, stop in streaming if stop.request is message],
     )
+
+
+def streaming(names: Names, commands: Sequence[Command], kept: Iterable[Message]) -> list[Streaming]:
+    """The commands whose answers another one stops, whatever the fields of its request are."""
+    present, known = {message.name for message in kept}, {command.name: command for command in commands}
+    found = []
+    for command in commands:
+        if command.stopped is None or not {each.name for each in command.messages} & present:
+            continue
+        stop = known[command.stopped.command]
+        fields = {value.name for value in stop.request.values}
+        if stop.request.name in present and not fields.intersection(command.stopped.repeats):
+            found.append(Streaming(handler_name(names, command.request), command, stop))
+    return found
 
 
 def _listed(command: Command) -> Listed | None:

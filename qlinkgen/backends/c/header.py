@@ -280,6 +280,7 @@ class Header:
             turns=dispatch.turns(self._names, self._protocol.exchanges.values(), self._kept),
             dialogues=dispatch.dialogues(self._names, commands) if listens else [],
             before=max((each.listed for each in slave if each.listed), key=attrgetter("most"), default=None),
+            streams=[each.begins for each in slave if each.begins],
             several=several(self._names, commands, self._kept) if listens else [],
         )
 
@@ -291,6 +292,7 @@ class Header:
             self._protocol.exchanges,
             address=section.view.address,
             reject=section.reject,
+            streams=dispatch.streaming(self._names, self._plan.commands, self._kept),
         )
         return [dispatch.refusing(each, self._names.prefix) for each in found] if self._refuses else found
 

@@ -1,4 +1,4 @@
-"""The end of answers of which each node in a list of the request sends one.
+"""Ends of several answers: one of each node in a list of the request, or none until another command.
 
 Copied next to modules that use it, unchanged.
 """
@@ -24,3 +24,23 @@ class EachOf(Many):
         self.each = each
         self.key = key
         self.by = by
+
+
+class UntilStopped(Many):
+    """Answers come until another command stops them.
+
+    Attributes:
+        stopped_by: name of that command.
+        repeats: attributes of its request that repeat those of the request.
+        next_within: byte times and seconds from one answer to the next, None: as for the first.
+    """
+
+    __slots__ = ("next_within", "repeats", "stopped_by")
+
+    def __init__(
+        self, stopped_by: str, repeats: tuple[str, ...], next_within: tuple[float, float] | None
+    ) -> None:
+        super().__init__()
+        self.stopped_by = stopped_by
+        self.repeats = repeats
+        self.next_within = next_within

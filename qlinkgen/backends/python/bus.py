@@ -168,9 +168,10 @@ class BusView:
     servers: Sequence[Server]
     nodes: str
     others: bool
-    many: bool
-    #: Whether commands with several answers have one of each node in a list.
-    listed: set[bool]
+    #: Classes of collections.abc.
+    abstract: Sequence[str]
+    #: Kinds of several answers: each, many, stream.
+    several: set[str]
     dialogues: bool
 
 
@@ -214,12 +215,29 @@ class BusModule:
             servers=servers,
             nodes=f", {self._nodes()}" if self._nodes() else "",
             others=any(each.done for each in self._transactions),
-            many=any(each.command.many for each in self._transactions),
-            listed={t.command.each is not None for t in self._transactions if t.command.many},
+            abstract=self._abstract(callers=bool(callers), servers=bool(servers)),
+            several=self._several,
             dialogues=any(each.command.steps for each in self._transactions),
         )
         template = templates().get_template("templates/bus.j2")
         return fitted(template.render(vars(view)).rstrip("\n") + "\n")
+
+    @property
+    def _several(self) -> set[str]:
+        return {kind for each in self._transactions if (kind := _several(each.command))}
+
+    def _abstract(self, *, callers: bool, servers: bool) -> list[str]:
+        """Classes of collections.abc that annotations use."""
+        several, dialogues = self._several, any(each.command.steps for each in self._transactions)
+        stream = "stream" in several
+        used = {
+            "AsyncGenerator": stream and callers,
+            "Callable": servers or dialogues,
+            "Generator": (dialogues and servers) or (stream and callers),
+            "Iterable": stream and servers,
+            "Sequence": dialogues or (servers and bool(several) and not stream),
+        }
+        return [name for name, needed in used.items() if needed]
 
     def _class(self, message: MessagePlan) -> str:
         """The class of a message; adds it to the imports."""
@@ -269,24 +287,37 @@ class BusModule:
         names = dict.fromkeys(held(each) for each in self._settable(transaction))
         return [f"{name}={name}" for name in names]
 
-    def _answer(self, transaction: Transaction, more: Sequence[MessagePlan], *, surely: bool = False) -> str:
-        """Return type of a method; ``more`` are answers besides the response."""
+    def _answer(
+        self,
+        transaction: Transaction,
+        more: Sequence[MessagePlan],
+        *,
+        surely: bool = False,
+        stream: str = "Iterable",
+    ) -> str:
+        """Return type of a method.
+
+        Args:
+            transaction: the transaction.
+            more: answers besides the response.
+            surely: whether it never returns None.
+            stream: class of answers without an end.
+        """
         if transaction.response is None:
             return "None"
         names = [self._class(each) for each in (transaction.response, *more)]
         if transaction.answers:
             names[0] = f"tuple[{', '.join(self._class(each) for each in transaction.answers)}]"
         if transaction.command.many is not None:
-            found = " | ".join(names)
-            names[0] = f"dict[int, {found} | None]" if transaction.command.each else f"list[{found}]"
+            names[0] = _type_of_several(transaction.command, names, stream)
         return " | ".join(names if surely else [*names, "None"])
 
     def _ask(self, call: Transaction, wait: str) -> str:
         """The statement that returns the answer."""
         if call.answers:
             return f"return {wait}self.ask_steps(_request, [{', '.join(n for n, _ in self._further(call))}])"
-        kind = "_many" if call.command.many is not None else "_any" if call.done else ""
-        kind = "_each" if call.command.each else kind
+        several = _several(call.command)
+        kind = f"_{several}" if several else "_any" if call.done else ""
         return f"return {wait}self.ask{kind}(_request, {self._asked(call)})"
 
     def _asked(self, transaction: Transaction) -> str:
@@ -321,12 +352,17 @@ class BusModule:
         return _make_caller(name, doc, methods, asynchronous=asynchronous, one=node)
 
     def _method(self, call: Transaction, *, asynchronous: bool, node: bool) -> Method:
-        command = call.command
+        command, for_tasks = call.command, asynchronous
         address = "" if node or command.addressing in ("broadcast", "none") else self._place.address
-        answer = self._answer(call, call.done, surely=node or command.addressing != "either")
+        asynchronous = asynchronous and not command.stopped  # which returns an iterator at once
+        stream = "AsyncGenerator" if for_tasks else "Generator"
+        answer = self._answer(call, call.done, surely=node or command.addressing != "either", stream=stream)
         head = self._head(call, address, answer, asynchronous=asynchronous)
         entry = f"{address}: Address of the node, {self._nodes()}{self._all(command)}." if address else ""
-        doc = _summary(command) if asynchronous else [*_summary(command), *self._arguments(call, entry)]
+        doc = _summary(command) if for_tasks else [*_summary(command), *self._arguments(call, entry)]
+        if command.stopped:
+            text = f"Closing the iterator stops the answers, as {method(command.stopped.command)} does."
+            doc[len(_summary(command)) :] = ["", text, *doc[len(_summary(command)) :]]
         body = self._body(call, "await " if asynchronous else "", address=address, node=node)
         return Method(head, python_text.docstring(doc), body)
 
@@ -475,7 +511,7 @@ class BusModule:
         if _answers_once(command):
             doc += ["", "Each node in the list answers once, in the order of the list."]
         elif command.many is not None:
-            doc += ["", "Return a list: several answers are sent."]
+            doc += ["", *textwrap.wrap(_how_many(command), WIDTH - 8)]
         if call.others:
             names = " or ".join(self._class(each) for each in call.others)
             doc += ["", *textwrap.wrap(f"Return {names} to answer in another way.", WIDTH - 8)]
@@ -493,6 +529,32 @@ class BusModule:
         several = call.command.many is not None and not _answers_once(call.command)
         before, after = ("return [", ")]") if several else ("return ", ")")
         return wrapped(f"{before}{self._class(message)}(", given, after, 8)
+
+
+def _type_of_several(command: Command, names: Sequence[str], stream: str) -> str:
+    """The type of several answers, whose classes are ``names``; one alone is an answer without an end too."""
+    found = " | ".join(names)
+    if command.stopped:
+        return f"{names[0]} | {stream}[{found}]" if stream == "Iterable" else f"{stream}[{found}]"
+    return f"dict[int, {found} | None]" if command.each else f"list[{found}]"
+
+
+def _how_many(command: Command) -> str:
+    """What a handler of a command with several answers returns."""
+    if command.stopped is None:
+        return "Return a list: several answers are sent."
+    stop = method(command.stopped.command)
+    return (
+        f"Return the first answer, several, or an iterator of all until {stop}. "
+        "The engine takes further ones, with the request."
+    )
+
+
+def _several(command: Command) -> str:
+    """How several answers are returned: each, many or stream; "" if there is one."""
+    if command.many is None:
+        return ""
+    return "each" if command.each else "stream" if command.stopped else "many"
 
 
 def _answers_once(command: Command) -> bool:

@@ -55,7 +55,7 @@ _SHARED: Mapping[str, Sequence[str]] = {
     "_digits": ("BetweenRule", "decimal", "read_decimal", "read_hexadecimal", "start_of"),
     "_filled": ("differing",),
     "_rchoices": ("ChoiceRule",),
-    "_reach": ("EachOf",),
+    "_reach": ("EachOf", "UntilStopped"),
     "_records": (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records"),
     "_rules": ("FloatRule", "ListRule", "PaddedRule"),
     "_rvaried": (

@@ -16,6 +16,7 @@ from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import (
     Allowance,
     Bus,
+    ByCommand,
     ByCount,
     ByEach,
     ByField,
@@ -178,7 +179,15 @@ def _row_bits(command: Command, name: str) -> int:
 
 def many_class(many: Many) -> str:
     """The class of the end of several answers."""
-    return "EachOf" if isinstance(many, ByEach) else "Many"
+    match many:
+        case ByEach():
+            return "EachOf"
+        case ByCommand():
+            return "UntilStopped"
+        case ByCount() | ByField() | ByReply() | ByTime():
+            return "Many"
+        case _:
+            assert_never(many)
 
 
 def _end(many: Many, kept: Mapping[str, MessagePlan]) -> str:
@@ -196,6 +205,10 @@ def _end(many: Many, kept: Mapping[str, MessagePlan]) -> str:
         case ByEach():
             names = [f'"{attribute(name)}"' if name else '""' for name in (many.field, many.key, many.by)]
             return ", ".join([*names, str(many.most)])
+        case ByCommand():
+            names = [f'"{attribute(name)}"' for name in many.repeats]
+            within = "None" if many.within is None else _time(many.within)
+            return f'"{many.command}", {tuple_of(names)}, {within}'
         case _:
             assert_never(many)
 

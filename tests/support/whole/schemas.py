@@ -108,6 +108,7 @@ class _Maker:
         asks = not parties or bool(document.get("commands"))
         if shape.bus == "master_slave" and asks and self.seed % (3 if parties else _LINK) == 1:
             _link(rng, document)
+        _stop_answers(random.Random(f"streams {self.seed}"), document)
         maker.forget_unused(document)
         if not several:
             _name_parts(rng, document)
@@ -608,6 +609,33 @@ def _lists(spec: object) -> bool:
     """Whether a field may be a list of nodes."""
     kind = spec.get("type") if isinstance(spec, dict) and spec.keys() <= {"type", "doc", "section"} else spec
     return re.match(r"(u\d+|bytes)\[[1-9]", str(kind)) is not None
+
+
+def _stop_answers(rng: random.Random, document: Doc) -> None:
+    """Let another command stop the answers to one, in some schemas."""
+    commands: Doc = document.get("commands", {})
+    if (
+        document["bus"]["kind"] not in {"master_slave", "link"}
+        or "defaults" in document
+        or rng.random() < 0.5
+    ):
+        return
+    plain = {
+        name: each for name, each in commands.items() if not each.keys() & {"many", "steps", "in_flight"}
+    }
+    stops = {name: each for name, each in plain.items() if each["request"] == {}}
+    begin = [name for name, each in plain.items() if each["response"] != "none"]
+    pairs = [(a, b) for a in begin for b in stops if a != b and _may_stop(plain[b], plain[a])]
+    if pairs:
+        name, stop = rng.choice(pairs)
+        commands[name]["many"] = {"until": stop} | ({"within": "40 ms"} if rng.random() < 0.5 else {})
+
+
+def _may_stop(stop: Doc, begun: Doc) -> bool:
+    """Whether the request of one command can stop the answers to another one."""
+    to_all = begun.get("addressing") == "answered_broadcast" and stop.get("addressing") == "node"
+    same = all(stop.get(key) == begun.get(key) for key in ("from", "frame"))
+    return same and begun.get("addressing") != "either" and not to_all
 
 
 def _link(rng: random.Random, document: Doc) -> None:
