@@ -118,7 +118,7 @@ class Checksum:
         if compute is crc_hqx and order == "big":
             return crc_hqx  # the CRC of data and its CRC is 0
         return lambda data, start: (
-            compute(data[:-size], start) ^ int.from_bytes(data[-size:], order)
+            compute(bytes(data[:-size]), start) ^ int.from_bytes(data[-size:], order)
         )
 
 
@@ -162,10 +162,12 @@ def crc(
 def _mirrored_crc(xorout: int) -> Crc:
     """The function of the standard library for mirrored bytes; its register is mirrored, too."""
     mirror = bytes(_reflect(byte, 8) for byte in range(256))
+    low = [each ^ xorout & 0xFF for each in mirror]
+    high = [each << 8 ^ xorout & 0xFF00 for each in mirror]
 
     def compute(data: bytes, register: int) -> int:
-        crc = crc_hqx(bytes(data).translate(mirror), register)
-        return (mirror[crc & 0xFF] << 8 | mirror[crc >> 8]) ^ xorout
+        crc = crc_hqx(data.translate(mirror), register)
+        return high[crc & 0xFF] | low[crc >> 8]
 
     return compute
 
@@ -176,9 +178,7 @@ def _plain_crc(width: int, poly: int, spare: int, refout: bool, xorout: int) -> 
         high, lambda value: (value << 1 ^ (poly if value & high else 0)) & mask
     )
     if width == 16:
-        earlier = [(each << 8 & mask) ^ table[each >> 8] for each in table]
-        pairs = [first ^ last for first in earlier for last in table]
-        return _wide_crc(">H", pairs, refout, xorout)
+        return _plain_pairs(table, refout, xorout)
 
     def compute(data: bytes, register: int) -> int:
         for byte in data:
@@ -195,9 +195,7 @@ def _reflected_crc(width: int, poly: int, refout: bool, xorout: int) -> Crc:
         1, lambda value: value >> 1 ^ (feedback if value & 1 else 0), up=False
     )
     if width == 16:
-        earlier = [each >> 8 ^ table[each & 0xFF] for each in table]
-        pairs = [first ^ last for last in table for first in earlier]
-        return _wide_crc("<H", pairs, not refout, xorout)
+        return _reflected_pairs(table, refout, xorout)
 
     def compute(data: bytes, register: int) -> int:
         for byte in data:
@@ -207,25 +205,52 @@ def _reflected_crc(width: int, poly: int, refout: bool, xorout: int) -> Crc:
     return compute
 
 
-def _wide_crc(order: str, pairs: list[int], mirrored: bool, xorout: int) -> Crc:
-    """A CRC of 16 bits from the changes by every pair of bytes, twice as fast as from single bytes."""
-    unpack = Struct(order).iter_unpack
-    high = order == ">H"
+class _Split(dict[int, "Callable[[bytes], tuple[int, ...]]"]):
+    """By the size of data, the function that splits it into pairs of bytes and an odd one.
+
+    A CRC of 16 bits from the changes by every pair is twice as fast as from those by single bytes.
+    """
+
+    def __init__(self, form: str) -> None:
+        super().__init__()
+        self._form = form
+
+    def __missing__(self, size: int) -> Callable[[bytes], tuple[int, ...]]:
+        self[size] = unpack = Struct(self._form.format(pairs=size >> 1, odd=size & 1)).unpack
+        return unpack
+
+
+def _plain_pairs(table: list[int], refout: bool, xorout: int) -> Crc:
+    earlier = [(each << 8 & 0xFFFF) ^ table[each >> 8] for each in table]
+    pairs = [first ^ last for first in earlier for last in table]
+    tops = {each & 0xFF: top for top, each in enumerate(table)}
+    split = _Split(">{odd}B{pairs}H")
 
     def compute(data: bytes, register: int) -> int:
-        if len(data) & 1:
-            # Zeros would precede the pair: only the half of the register that meets the byte changes.
-            first = data[0]
-            register = (
-                (register << 8 & 0xFF00) ^ pairs[register >> 8 ^ first]
-                if high
-                else register >> 8 ^ pairs[(register ^ first) << 8 & 0xFF00]
-            )
-            data = data[1:]
-        pair: int
-        for (pair,) in unpack(data):
+        size = len(data)
+        if size & 1 and register:
+            # The odd byte is the first one, like a pair with a zero: begin before that.
+            top = tops[register & 0xFF]
+            register = top << 8 | (register ^ table[top]) >> 8
+        for pair in split[size](data):
             register = pairs[register ^ pair]
-        return (_reflect(register, 16) if mirrored else register) ^ xorout
+        return (_reflect(register, 16) if refout else register) ^ xorout
+
+    return compute
+
+
+def _reflected_pairs(table: list[int], refout: bool, xorout: int) -> Crc:
+    earlier = [each >> 8 ^ table[each & 0xFF] for each in table]
+    pairs = [first ^ last for last in table for first in earlier]
+    split = _Split("<{pairs}H{odd}x")
+
+    def compute(data: bytes, register: int) -> int:
+        size = len(data)
+        for pair in split[size](data):
+            register = pairs[register ^ pair]
+        if size & 1:
+            register = register >> 8 ^ table[(register ^ data[-1]) & 0xFF]
+        return (register if refout else _reflect(register, 16)) ^ xorout
 
     return compute
 
