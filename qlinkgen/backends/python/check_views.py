@@ -31,7 +31,7 @@ class PlacedCheck:
     """A check value, its offsets in the frame, and the expression for the bytes that it covers.
 
     Attributes:
-        ahead: the same for the bytes before it, ``body``; "" unless it is the last part.
+        ahead: the same in a method of the message for ``body``, the bytes before it; "" unless it is last.
         mark: what the names of its functions end with, "" for the main one.
         seeded: it covers attributes of the message.
         main: another algorithm can replace it.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from qlinkgen.backends.python import pieces, values
+from qlinkgen.backends.python import integers, pieces, values
 from qlinkgen.backends.python.check_views import PlacedCheck
 from qlinkgen.backends.python.decode import Decoder
 from qlinkgen.backends.python.encode import Encoder
@@ -47,6 +47,7 @@ class AfterView(ConditionalView):
 
     Attributes:
         met: the same as an expression.
+        met_in_buffer: the same for a header at ``start`` in ``buf``; "" if that takes ``head``.
         values: the values in them.
         octets: statements of a method that returns their bytes, with zeros for check values.
         taken: statements of a method that sets the values from the end of ``frame``.
@@ -55,6 +56,7 @@ class AfterView(ConditionalView):
     """
 
     met: str
+    met_in_buffer: str
     values: Sequence[AfterValue]
     octets: Sequence[str]
     taken: Sequence[str]
@@ -63,11 +65,11 @@ class AfterView(ConditionalView):
 
     @property
     def needed(self) -> str:
-        """The expression for whether ``frame`` has them, or ``message`` has other values than without them.
+        """The expression for whether ``frame`` has them, or its message has other values than without them.
 
         Identity is faster than a comparison, and enough: `octets` tells equal values.
         """
-        tests = [f"message.{each.name} is not {each.constant}" for each in self.values]
+        tests = [f"self.{each.name} is not {each.constant}" for each in self.values]
         return " or ".join([self.met.replace("head", "frame"), *tests])
 
     def slots(self, address: str = "") -> list[str]:
@@ -115,7 +117,8 @@ def after_view(
     taken = [line.replace("message.", "self.") for line in decoder.assignments]
     return AfterView(
         *_facts(envelope, found),
-        met=_met(envelope, found),
+        met=_met(envelope, found, "head") or "_has_after(head)",
+        met_in_buffer=_met(envelope, found, *pieces.BUFFER),
         values=[
             AfterValue(held(each), values.annotation((each,), place), values.default(each, place))
             for each in found.values
@@ -140,19 +143,19 @@ def _facts(envelope: Envelope, found: Conditional) -> tuple[str, bool, Sequence[
     return listed, found.length is None, tests, found.size, literal(found.initial)
 
 
-def _met(envelope: Envelope, found: Conditional) -> str:
-    """The condition as an expression: without a call if it is simple."""
-    if len(found.selectors) == 1:
-        number = _number(envelope, found.selectors[0])
-        test = condition((replace(found.selectors[0].test, value="number"),), "{}")
-        if test.count("number") == 1 and " or " not in test and " and " not in test:
-            return test.replace("number", number)
-    return "_has_after(head)"
+def _met(envelope: Envelope, found: Conditional, source: str, base: str = "") -> str:
+    """The condition as an expression without a call, "" unless it is a simple one about one byte."""
+    selector = found.selectors[0]
+    test = condition((replace(selector.test, value="number"),), "{}")
+    simple = test.count("number") == 1 and " or " not in test and " and " not in test
+    if len(found.selectors) > 1 or selector.part.size > 1 or not simple:
+        return ""
+    return test.replace("number", _number(envelope, selector, source, base))
 
 
 def _tests(envelope: Envelope, found: Conditional) -> Iterator[str]:
     for each in found.selectors:
-        yield f"number = {_number(envelope, each)}"
+        yield f"number = {_number(envelope, each, 'head')}"
         test = replace(each.test, value="number")
         if each is found.selectors[-1]:
             yield f"return {condition((test,), '{}')}"
@@ -161,13 +164,10 @@ def _tests(envelope: Envelope, found: Conditional) -> Iterator[str]:
             yield "    return False"
 
 
-def _number(envelope: Envelope, selector: Selector) -> str:
+def _number(envelope: Envelope, selector: Selector, source: str, base: str = "") -> str:
     """The bits of a header that a condition is about."""
-    whole = pieces.read(envelope, selector.part, "head")
-    if selector.bits == selector.part.integer.bits:
-        return whole
-    shifted = f"{whole} >> {selector.shift}" if selector.shift else whole
-    return f"{shifted} & 0x{selector.mask:X}"
+    whole = pieces.read(envelope, selector.part, source, base)
+    return integers.bits_of(selector.part.integer, whole, selector.shift, selector.bits)
 
 
 def _opposite(test: Test) -> Test:

@@ -155,7 +155,7 @@ class Decoder:
         lines: list[str] = []
         if place.envelope and (address := place.envelope.address):
             raw = f"{place.address}_part"
-            lines = [f"{raw} = {pieces.number(place.envelope, address, place.data, place.skipped)}"]
+            lines = [f"{raw} = {pieces.number(place.envelope, address, place.data, skipped=place.skipped)}"]
             lines += self._address_check(address[0].part, raw, _INDENT + 4)
             chosen = [f"{place.address}={raw}", *chosen]
         elif place.address and self.message.allowed is not None:
@@ -173,9 +173,8 @@ class Decoder:
         assert place.envelope is not None
         reader = Decoder(self.message, place, self.title, self.scales)
         for part, member in place.envelope.values:
-            seen = pieces.read(place.envelope, part, place.data, place.skipped)
-            shifted = f"{seen} >> {member.shift}" if member.shift else seen
-            taken = f"{shifted} & 0x{(1 << member.bits) - 1:X}" if member.bits < part.integer.bits else seen
+            seen = pieces.read(place.envelope, part, place.data, skipped=place.skipped)
+            taken = integers.bits_of(part.integer, seen, member.shift, member.bits)
             reader.get_member(member, taken, self._place_of(part), place.data)
         return reader.assignments
 
@@ -212,8 +211,7 @@ class Decoder:
         self._get(part.integer, whole, at)
         self._put_together(part.integer, whole)
         for slot in part.slots:
-            shifted = f"{whole} >> {slot.shift}" if slot.shift else whole
-            taken = f"{shifted} & 0x{(1 << slot.bits) - 1:X}" if slot.bits < part.integer.bits else whole
+            taken = integers.bits_of(part.integer, whole, slot.shift, slot.bits)
             if isinstance(slot, AddressSlot):
                 number = f"{part.name}_address"
                 self._values.append(f"{number} = {taken}")
@@ -522,19 +520,14 @@ class Decoder:
         self._get(step.integer, whole, at)
         self._put_together(step.integer, whole, value_name(step), self._offset(step))
         for member in step.members:
-            mask = (1 << member.bits) - 1
-            taken = f"{whole} >> {member.shift} & 0x{mask:X}" if member.shift else f"{whole} & 0x{mask:X}"
+            taken = integers.bits_of(step.integer, whole, member.shift, member.bits)
             self.get_member(member, taken, self._offset(step))
 
     def take_end(self, envelope: Envelope, part: CellPart) -> None:
         """Check and assign the values of a part after the payload of ``frame``."""
         seen = pieces.read(envelope, part, "frame")
-        whole = f"({seen})" if " | " in seen else seen
         for member in part.values:
-            taken = seen
-            if member.bits < part.integer.bits:
-                shifted = f"{whole} >> {member.shift}" if member.shift else whole
-                taken = f"{shifted} & 0x{(1 << member.bits) - 1:X}"
+            taken = integers.bits_of(part.integer, seen, member.shift, member.bits)
             self.get_member(member, taken, str(-envelope.from_end(part)), "frame")
 
     @property

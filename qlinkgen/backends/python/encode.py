@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import assert_never
 
@@ -179,9 +180,10 @@ class Encoder:
                 self._id(part)
             case AddressPart():
                 self._integer(part.integer, self._addressed())
-            case CellPart(slots=(Member() as value,)) if self._alone(part, value):
+            case CellPart() if (value := self._alone(part)) is not None:
                 source = f"self.{attribute(value.name)}"  # struct checks type and range
-                self._require(source, *value.conditions)
+                whole = value.bits == part.integer.bits
+                self._require(source, *(value.conditions if whole else limits(value.number)))
                 self._integer(part.integer, source)
             case CellPart() | EqualPart():
                 self._lines.append(f"{part.name}_part = {bare(self._part_number(part))}")
@@ -197,16 +199,18 @@ class Encoder:
         else:
             self._integer(part.integer, self.number)
 
-    def _alone(self, part: CellPart, value: Member) -> bool:
-        """Whether a part holds nothing but a number that struct can pack, and nothing is derived from it."""
+    def _alone(self, part: CellPart) -> Member | None:
+        """The only value of a part, if struct can pack it as that part, and nothing is derived from it."""
         followers = (each for each in (*self.place.front, *self.place.back) if isinstance(each, EqualPart))
-        return (
-            bool(integers.letter(part.integer, self.place.byteorder))
-            and (value.shift, value.bits) == (0, part.integer.bits)
-            and not (value.number.signed or value.number.scaling)
-            and not isinstance(value.number.meaning, Float | Characters)
-            and all(each.of is not part for each in followers)
-        )
+        letter = integers.letter(part.integer, self.place.byteorder)
+        match _set(part):
+            case [Member(shift=0, number=number) as value] if letter:
+                direct = not (
+                    number.signed or number.scaling or isinstance(number.meaning, Float | Characters)
+                )
+                return value if direct and all(each.of is not part for each in followers) else None
+            case _:
+                return None
 
     def _size(self, part: LengthPart) -> str:
         """What a length counts, in bytes."""
@@ -232,7 +236,7 @@ class Encoder:
             case AddressPart():
                 return f"self.{self.place.address}"
             case CellPart():
-                return " | ".join(map(self._slot, part.slots))
+                return " | ".join(map(self._slot, _set(part))) or "0"
             case EqualPart(of=CellPart()):
                 return pieces.derived_part(part, f"{part.of.name}_part")
             case EqualPart():
@@ -528,6 +532,11 @@ class Encoder:
         self.place.use("Struct")
         self.constants += table(name, text, "pack", row.items, "n")
         return wrapped(f"{before}{name}[{row.items.name}_count](", row.arguments, ")", _INDENT)
+
+
+def _set(part: CellPart) -> Sequence[Slot]:
+    """The slots of a part without constant zeros."""
+    return [slot for slot in part.slots if not isinstance(slot, ConstantSlot) or slot.values[0]]
 
 
 def _handing(part: LengthPart, size: str) -> str:

@@ -94,7 +94,7 @@ def placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> Pl
         start=start,
         end=end,
         covered=covered,
-        ahead="" if end else _covered(envelope, part, "body", part.check.size),
+        ahead="" if end else _covered(envelope, part, "body", "self", part.check.size),
         otherwise=part.check.otherwise,
         mark=mark,
         seeded=seeded,
@@ -106,12 +106,14 @@ def placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> Pl
     )
 
 
-def _covered(envelope: Envelope, part: CheckPart, data: str, without: int = 0) -> str:
+def _covered(
+    envelope: Envelope, part: CheckPart, data: str, message: str = "message", without: int = 0
+) -> str:
     """Expression for the bytes that a check value covers, in a frame ``without`` its last bytes."""
     found = []
     for run in envelope.coverage(part):
         if isinstance(run, Seed):
-            found.append(f"message.{seed_name(run)}")
+            found.append(f"{message}.{seed_name(run)}")
             continue
         for group, always in _groups(envelope, run):
             first, after = _edge(envelope, group[0]), _edge(envelope, group[-1], after=True)

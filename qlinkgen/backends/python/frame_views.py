@@ -64,7 +64,8 @@ class HeadCheck:
 
     Attributes:
         fault: "number", "address" or "constant" if only a decoder of one whole frame reports it.
-        whole: the condition for a whole header, "" if decoding its message finds the same.
+        whole: the same for a header at ``start`` in ``buf``, "" if decoding its message finds it; at the end
+            of the buffer it holds or raises an IndexError.
     """
 
     test: str
@@ -78,8 +79,9 @@ class LengthView:
     """The length of a frame: bounds, offsets, its value in ``head`` and the bytes of ``number``.
 
     Attributes:
-        quick: the same value; raises an IndexError if the header is too short, unless ``sliced``.
-        sliced: if the header is too short, ``quick`` is a wrong number.
+        lead: the bytes before it, "" unless they are constant.
+        quick: the same value at ``start`` in ``buf``; raises an IndexError at its end, unless ``sliced``.
+        sliced: at the end of the buffer ``quick`` is a wrong number.
         bounded: its part holds numbers beyond the bounds.
         last: the last number that the first of two lengths states, None if there is one length.
     """
@@ -89,6 +91,7 @@ class LengthView:
     most: int
     start: int
     end: int
+    lead: str
     value: str
     quick: str
     sliced: bool
@@ -103,6 +106,7 @@ class StuffingView:
     """Stuffing of ``whole`` frames except their first and last bytes, or of payloads only.
 
     Attributes:
+        last: the byte before an inserted one.
         coding: in place of the stuffing, None if bytes are inserted.
         reveals: the byte after which the next one can be wrong; "" if any can, or none.
         steady: no byte can be wrong.
@@ -113,6 +117,7 @@ class StuffingView:
     insert: str
     front: int
     back: int
+    last: str = ""
     coding: CodingView | None = None
     reveals: str = ""
     steady: bool = False
@@ -203,6 +208,7 @@ class PartsView:
     blank_trailer: str
     id_start: str
     id_of: str
+    id_of_buffer: str
     id_of_frame: str
     address_of: str
     bare: bool
@@ -224,9 +230,29 @@ class PartsView:
         return self.before.size if self.before else 0
 
     @property
-    def specific(self) -> bool:
-        """Whether the bytes around the payload depend on more of a message than its own code packs."""
-        return bool(self.seeds or (self.after and self.after.values))
+    def direct(self) -> bool:
+        """Whether an encoder computes the only check value of a frame where it adds it."""
+        check = self.main
+        alone = check is not None and len(self.filling) == 1 and check.otherwise is None
+        return alone and self.quick and not self.before
+
+    @property
+    def last(self) -> bool:
+        """Whether that ends the frame: then an encoder handles the bytes ahead of it."""
+        return self.direct and self.main is not None and bool(self.main.ahead)
+
+    @property
+    def tail(self) -> int:
+        """Bytes after the payload in what an encoder handles."""
+        return self.trailer - (self.main.view.size if self.last and self.main else 0)
+
+    @property
+    def before_check(self) -> tuple[str, str] | None:
+        """The condition and the function that changes a frame ahead of its check value; None without."""
+        data = "body" if self.last else "frame"
+        if self.stuffing and not self.stuffing.whole and not self.stuffing.coding:
+            return f"{self.stuffing.last} in {data}[_HEADER:]", "_stuffed"
+        return (f"not {data}[{-self.tail - 1}]", "_trimmed") if self.trim is not None else None
 
     @property
     def main(self) -> PlacedCheck | None:

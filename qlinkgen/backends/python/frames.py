@@ -188,6 +188,22 @@ def wrap_lines(view: UniqueView, fixed: int | None) -> list[str]:
     ]
 
 
+def finish_lines(view: PartsView) -> list[str]:
+    """The last steps of an encoder."""
+    lines, frame = [], f"_wrapped(body{', self' if view.seeds else ''})"
+    if view.last and view.main:
+        if view.before_check:
+            condition, change = view.before_check
+            lines += [f"if {condition}:", f"    body = {change}(body)"]
+        lines.append(f"crc = _CHECKSUM.compute({view.main.ahead}, _CHECKSUM.start)")
+        frame = f"body + {view.main.view.bytes}"
+    if not view.after:
+        return [*lines, f"return {frame}"]
+    completed = f"_complete(frame{', self' if view.after.values else ''})"
+    lines += [f"frame = {frame}", f"if {view.after.needed}:", f"    frame = {completed}"]
+    return [*lines, f"return {'_sent(frame)' if view.before else 'frame'}"]
+
+
 def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
     whole = plan.frame.envelope
     envelope = whole.inner
@@ -220,6 +236,7 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
         blank_trailer=_blank_trailer(envelope, address),
         id_start=_id_start(envelope),
         id_of=pieces.number(envelope, envelope.id, "head"),
+        id_of_buffer=pieces.number(envelope, envelope.id, *pieces.BUFFER),
         id_of_frame=_quick_id(envelope),
         address_of=pieces.number(envelope, envelope.address, "head") if _leads(envelope) else "",
         bare=bare,
@@ -345,6 +362,7 @@ def _length_view(plan: Plan, envelope: Envelope) -> LengthView | None:
         most=(longer or part).most * part.scale,
         start=start,
         end=start + part.size,
+        lead=literal(envelope.preamble) if len(envelope.preamble) == start else "",
         value=value,
         quick=_quick_length(part, start),
         sliced=integers.is_sliced(part.integer),
@@ -356,7 +374,8 @@ def _length_view(plan: Plan, envelope: Envelope) -> LengthView | None:
 
 
 def _quick_length(part: LengthPart, start: int) -> str:
-    read = integers.read_bytewise(part.integer, "head", start)
+    source, base = pieces.BUFFER
+    read = integers.read_bytewise(part.integer, source, start, base)
     if part.scale == 1:
         return read
     return f"({read}) * {part.scale}" if "|" in read else f"{read} * {part.scale}"
@@ -381,18 +400,20 @@ def _stuffing(plan: Plan) -> StuffingView | None:
             stage = transparency.bytewise
             reveals = literal(bytes((stage.escape,))) if isinstance(stage, Escaping) else ""
             front, back, coding = transparency.front, transparency.back, coding_view(transparency.stages)
-            return StuffingView(True, "", "", front, back, coding, reveals, steady=isinstance(stage, Add))
+            steady = isinstance(stage, Add)
+            return StuffingView(True, "", "", front, back, coding=coding, reveals=reveals, steady=steady)
         case FrameStuffing():
             whole, front, back = True, transparency.front, transparency.back
         case PayloadStuffing(Add()):
-            return StuffingView(False, "", "", 0, 0, coding_view((transparency.rule,)), steady=True)
+            return StuffingView(False, "", "", 0, 0, coding=coding_view((transparency.rule,)), steady=True)
         case PayloadStuffing():
             whole, front, back = False, 0, 0
         case _:
             assert_never(transparency)
     rule = transparency.rule
     assert isinstance(rule, Insertion)
-    return StuffingView(whole, literal(rule.after), literal(bytes((rule.insert,))), front, back)
+    after, insert = literal(rule.after), literal(bytes((rule.insert,)))
+    return StuffingView(whole, after, insert, front, back, last=in_hex(rule.after[-1]))
 
 
 def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[HeadCheck]:
@@ -403,19 +424,18 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
         match part:
             case ConstantPart():
                 test = f"not {literal(part.data)}.startswith(head[{start}:{end}])"
-                yield HeadCheck(
-                    test, no_frame, "constant", f"head[{start or ''}:{end}] != {literal(part.data)}"
-                )
+                yield HeadCheck(test, no_frame, "constant", _differs(part.data, start))
             case LengthPart() if envelope.before and envelope.before.length:
                 yield _one_of_two(envelope, part, longer=part is envelope.before.length)
             case LengthPart():
-                whole = isinstance(plan.frame.transparency, FrameStuffing | Coded)
-                place = f"_take(buf, start, {end})[1]" if whole else f"start + {end}"
+                coded = isinstance(plan.frame.transparency, FrameStuffing | Coded)
+                place = f"_take(buf, start, {end})[1]" if coded else f"start + {end}"
                 bounds = "_MIN_LENGTH <= _length(head) <= _MAX_LENGTH"
                 yield HeadCheck(f"len(head) >= {end} and not {bounds}", f'"length", {place}, b""')
             case IdPart() | AddressPart() | CellPart() | EqualPart():
-                for test in pieces.wrong(envelope, part, "head"):
-                    yield HeadCheck(f"len(head) >= {end} and {test}", no_frame, "constant", test)
+                tests = (pieces.wrong(envelope, part, *source) for source in (("head",), pieces.BUFFER))
+                for test, whole in zip(*tests, strict=True):
+                    yield HeadCheck(f"len(head) >= {end} and {test}", no_frame, "constant", whole)
                 if bare and envelope.identifies(part) and envelope.known_at(part, envelope.id):
                     yield from _bare_checks(envelope, part, f"len(head) >= {end} and", no_frame)
             case CheckPart():
@@ -424,6 +444,15 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
                 raise AssertionError(f"{part.name} is not a part of a header")
             case _:
                 assert_never(part)
+
+
+def _differs(data: bytes, place: int) -> str:
+    """Whether other bytes are at a place of the frame in the buffer; true or an IndexError if none are."""
+    source, base = pieces.BUFFER
+    if len(data) == 1:  # numbers are compared faster
+        return f"{source}[{integers.index_of(base, place)}] != {in_hex(data[0])}"
+    ends = (integers.index_of(base, each) for each in (place, place + len(data)))
+    return f"{slice_of(source, *ends)} != {literal(data)}"
 
 
 def _one_of_two(envelope: Envelope, part: LengthPart, *, longer: bool) -> HeadCheck:

@@ -138,11 +138,16 @@ def read(integer: Integer, data: str, at: Callable[[int], str]) -> str:
     return " | ".join(group_terms(integer, own_bits(integer, sources)))
 
 
-def read_bytewise(integer: Integer, data: str, start: int) -> str:
+def index_of(base: str, place: int) -> str:
+    """The index of a place after a base, "" for the beginning of the data."""
+    return plus(base, place) if base else str(place)
+
+
+def read_bytewise(integer: Integer, data: str, start: int, base: str = "") -> str:
     """The same for two or three bytes, which is faster; an IndexError if there are too few."""
     if not _joins(integer) or integer.byteorder is None:
-        return read(integer, data, lambda more: str(start + more))
-    return joined(data, range(start, start + integer.size), integer.byteorder)
+        return read(integer, data, lambda more: index_of(base, start + more))
+    return joined(data, range(start, start + integer.size), integer.byteorder, base)
 
 
 def is_sliced(integer: Integer) -> bool:
@@ -155,10 +160,10 @@ def _joins(integer: Integer) -> bool:
     return integer.size in {2, 3} and not (integer.signed or integer.bcd)
 
 
-def joined(data: str, places: range, byteorder: str) -> str:
+def joined(data: str, places: range, byteorder: str, base: str = "") -> str:
     """The number in bytes at these places."""
     terms = [
-        f"{data}[{place}]{f' << {8 * index}' if index else ''}"
+        f"{data}[{index_of(base, place)}]{f' << {8 * index}' if index else ''}"
         for index, place in enumerate(places if byteorder == "little" else reversed(places))
     ]
     return " | ".join(terms)
@@ -183,6 +188,16 @@ def group_terms(integer: Integer, sources: Sequence[str]) -> tuple[str, ...]:
     """The groups of an integer, each shifted into place; the caller masks unused bits."""
     pairs = zip(sources, integer.chunks, strict=True)
     return tuple(f"{source} << {chunk.shift}" if chunk.shift else source for source, chunk in pairs)
+
+
+def bits_of(integer: Integer, whole: str, shift: int, bits: int) -> str:
+    """Some bits of an integer, which is an expression."""
+    if bits == integer.bits and not integer.signed:
+        return whole
+    primary = f"({whole})" if " | " in whole else whole
+    shifted = f"{primary} >> {shift}" if shift else primary
+    highest = shift + bits == integer.bits == 8 * integer.size and not integer.signed
+    return shifted if highest else f"{shifted} & 0x{(1 << bits) - 1:X}"
 
 
 def sign_extended(number: str, bits: int) -> str:

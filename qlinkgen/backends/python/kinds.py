@@ -321,10 +321,7 @@ class Members:
             encoder.put_member(member)
             place = -envelope.from_end(part) if part in envelope.back else envelope.offset(part)
             seen = pieces.read(envelope, part, "frame")
-            if member.bits < part.integer.bits:
-                seen = f"({seen})" if " " in seen else seen
-                seen = f"{seen} >> {member.shift}" if member.shift else seen
-                seen = f"{seen} & 0x{(1 << member.bits) - 1:X}"
+            seen = integers.bits_of(part.integer, seen, member.shift, member.bits)
             decoder.get_member(member, seen, str(place), "frame")
         # The statements are those of a method of the message.
         self.checked = [line.replace("self.", "message.") for line in encoder.checks]

@@ -161,7 +161,7 @@ class Module:
             commands=tables.command_rows(plan),
             records=[MessageRow(each.name, self.place.classes[each.name]) for each in plan.layouts],
             scales=[*self.builder.scales, *self._field_checks(), *tables.word_tables(plan.enums)],
-            classes=self._classes(models, view, sections.ways),
+            classes=self._classes(models, views, sections.ways),
             public=self._public(view, decoded),
             imports=self._imports(list(views.values()), models),
             directed=plan.directed,
@@ -191,8 +191,9 @@ class Module:
         banner_lines = [line for other in others for line in textwrap.wrap(other, WIDTH)]
         return python_text.docstring([*opening, "", *textwrap.wrap(about, WIDTH), "", *banner_lines])
 
-    def _classes(self, models: Sequence[ClassModel], view: AnyView, ways: Ways) -> str:
+    def _classes(self, models: Sequence[ClassModel], views: Mapping[str, AnyView], ways: Ways) -> str:
         template = templates().get_template("templates/class.j2")
+        common = list(views.values())[-1]
         framed = self.place.envelope is not None
         texts = []
         for each in models:
@@ -201,7 +202,7 @@ class Module:
             kind = "record" if record else "whole frame as sent" if whole else "payload"
             text = template.render(
                 each=each,
-                wrap=self._wrap(each, view) if each.has_codec and whole else [],
+                wrap=self._wrap(each, views.get(each.way, common)) if each.has_codec and whole else [],
                 encoder="to_frame" if whole else "to_bytes",
                 encoder_doc=f"The {'bytes of the ' * (kind == 'record')}{kind}. Raises EncodeError.",
                 data=self.place.data if whole else "payload",
@@ -216,7 +217,7 @@ class Module:
             case UniqueView():
                 return frames.wrap_lines(view, each.body_size)
             case PartsView():
-                return [f"return _wrapped(body{', self' if view.specific else ''})"]
+                return frames.finish_lines(view)
             case MarkedView() | PacketView() | KindsView():
                 return []
 

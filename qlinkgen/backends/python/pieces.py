@@ -9,44 +9,52 @@ from qlinkgen.backends.python.layout import literal
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import Bits, CellPart, ConstantPart, EqualPart, Numeric, Part
 
+#: A frame that begins anywhere in a buffer, as the source and base of these functions.
+BUFFER = ("buf", "start")
 
-def number(envelope: Envelope, pieces: tuple[Bits, ...], source: str, skipped: int = 0) -> str:
-    """The number or address in these pieces of a frame without its first bytes; "0" without pieces."""
+
+def number(
+    envelope: Envelope, pieces: tuple[Bits, ...], source: str, base: str = "", skipped: int = 0
+) -> str:
+    """The number or address in these pieces of a frame; "0" without pieces. Arguments as for `read`."""
     terms = [
-        _piece(bits, read(envelope, bits.part, source, skipped), alone=len(pieces) == 1) for bits in pieces
+        _piece(bits, read(envelope, bits.part, source, base, skipped), alone=len(pieces) == 1)
+        for bits in pieces
     ]
     return " | ".join(terms) or "0"
 
 
 def _piece(bits: Bits, whole: str, *, alone: bool) -> str:
     if not bits.whole:
-        whole = f"{whole} >> {bits.shift} & 0x{bits.mask:X}" if bits.shift else f"{whole} & 0x{bits.mask:X}"
+        whole = integers.bits_of(bits.part.integer, whole, bits.shift, bits.mask.bit_length())
         whole = whole if alone else f"({whole})"
     return f"{whole} << {bits.at}" if bits.at else whole
 
 
-def read(envelope: Envelope, part: Numeric, source: str, skipped: int = 0) -> str:
-    """The integer of a part of a frame, or of its header if the part precedes the payload."""
+def read(envelope: Envelope, part: Numeric, source: str, base: str = "", skipped: int = 0) -> str:
+    """The integer of a part of a frame, or of its header if the part precedes the payload.
+
+    The frame without its first ``skipped`` bytes begins at ``base``, or at the beginning of the source.
+    """
     if part in envelope.front:
         start = envelope.offset(part) - skipped
-        return integers.read(part.integer, source, lambda more: str(start + more))
+        return integers.read(part.integer, source, lambda more: integers.index_of(base, start + more))
     start = -envelope.from_end(part)
     return integers.read(part.integer, source, lambda more: str(start + more) if start + more else "")
 
 
-def wrong(envelope: Envelope, part: Part, source: str) -> Iterator[str]:
+def wrong(envelope: Envelope, part: Part, source: str, base: str = "") -> Iterator[str]:
     """Conditions that hold if a constant or a derived number in an integer is wrong."""
     match part:
         case CellPart():
             for slot in part.constants:
-                seen = read(envelope, part, source)
-                if slot.bits < part.integer.bits:
-                    shifted = f"{seen} >> {slot.shift}" if slot.shift else seen
-                    seen = f"{shifted} & 0x{(1 << slot.bits) - 1:X}"
+                seen = read(envelope, part, source, base)
+                seen = integers.bits_of(part.integer, seen, slot.shift, slot.bits)
                 right = ", ".join(f"0x{value:02X}" for value in slot.values)
                 yield f"{seen} not in ({right})" if len(slot.values) > 1 else f"{seen} != {right}"
         case EqualPart():
-            yield f"{read(envelope, part, source)} != {derived_part(part, read(envelope, part.of, source))}"
+            other = read(envelope, part.of, source, base)
+            yield f"{read(envelope, part, source, base)} != {derived_part(part, other)}"
         case _:
             pass
 
