@@ -87,11 +87,16 @@ def _message(
         envelope=envelope,
         allowed=OneOf(tuple(Within(*each) for each in message.addresses)) if message.addresses else None,
         frame_size=size,
-        wire_size=size + _growth(frame, envelope, message),
+        wire_size=size + max(_growth(each, _own(each, envelope), message) for each in frames),
         encoded=select.encoded(message, options.role),
         decoded=select.decoded(message, options.role),
         asked=asked,
     )
+
+
+def _own(frame: FramePlan, envelope: Envelope) -> Envelope:
+    """The parts of one of several kinds, or those of the message."""
+    return frame.envelope if frame.name else envelope
 
 
 def _growth(frame: FramePlan, envelope: Envelope, message: Message) -> int:

@@ -569,6 +569,12 @@ def _end_text(frame: FramePlan) -> str:
 def transparency_text(frame: FramePlan) -> str:
     """The stuffing of a frame."""
     way = frame.transparency
+    coded = [
+        each for each in frame.kinds if isinstance(each.transparency, Coded) and each.transparency.stages
+    ]
+    if coded:
+        texts = [f"{transparency_text(each)} of {each.name}" for each in coded]
+        return "; ".join([*texts, *(["others as they are"] if len(coded) < len(frame.kinds) else [])])
     if isinstance(way, Plain):
         return "bytes are sent as they are"
     envelope = frame.envelope

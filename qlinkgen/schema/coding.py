@@ -13,7 +13,6 @@ from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.stuffing import check_end
 
-_PATH: Path = ("frame", "coding")
 #: The key that names a coding, and the keys that complete it.
 _KINDS = {
     "escape": ("xor", "of"),
@@ -33,9 +32,11 @@ class CodingBuilder:
     """Builds the codings of one frame."""
 
     def __init__(
-        self, parts: Sequence[Part], builder: PartBuilder, report: Reporter, *, silent: bool
+        self, parts: Sequence[Part], builder: PartBuilder, report: Reporter, path: Path, *, silent: bool
     ) -> None:
-        """``parts`` are those of the frame; ``silent``: an idle line alone ends it."""
+        """``parts`` are those of the frame at a path; ``silent``: an idle line alone ends it."""
+        self._frame = path
+        self._path: Path = (*path, "coding")
         self._silent = silent
         self._parts = parts
         self._builder = builder
@@ -46,7 +47,7 @@ class CodingBuilder:
         if spec is None:
             return (), (), False
         if spec == []:
-            self._error(_PATH, "the list of codings is empty", "write at least one, or remove the key")
+            self._error(self._path, "the list of codings is empty", "write at least one, or remove the key")
             return (), (), False
         many = isinstance(spec, list)
         specs = spec if isinstance(spec, list) else [spec]
@@ -54,17 +55,22 @@ class CodingBuilder:
             self._check_open(specs)
         after = [index for index, each in enumerate(specs) if each.checked == "after"]
         for index in after:
-            self._check_after(specs[index], (*_PATH, index) if many else _PATH)
-        codings = [self._coding(each, (*_PATH, index) if many else _PATH) for index, each in enumerate(specs)]
+            self._check_after(specs[index], (*self._path, index) if many else self._path)
+        codings = [
+            self._coding(each, (*self._path, index) if many else self._path)
+            for index, each in enumerate(specs)
+        ]
         for index, coding in enumerate(codings[:-1]):
             if isinstance(coding, Cobs):
-                self._error((*_PATH, index), "COBS is followed by another coding", "move cobs to the end")
-        coded = self._coded(None, _PATH)
+                self._error(
+                    (*self._path, index), "COBS is followed by another coding", "move cobs to the end"
+                )
+        coded = self._coded(None, self._path)
         if after:
             coded = tuple(part.name for part in self._parts if part.role == "payload")
         given = [(each.over, index) for index, each in enumerate(specs) if each.over is not None]
         for over, index in given:
-            path: Path = (*_PATH, index, "over") if many else (*_PATH, "over")
+            path: Path = (*self._path, index, "over") if many else (*self._path, "over")
             if over != given[0][0]:
                 what = "codings of one frame apply to different parts"
                 self._error(path, what, "name the same parts in each, or only in one")
@@ -88,8 +94,8 @@ class CodingBuilder:
         if wrong:
             what = f"{wrong} cannot be decoded before the end of a frame is known"
             hint = "add a part with role: terminator"
-            needs = (_PATH, ("frame", "parts"))
-            self._report.error("not-applicable", _PATH, what, hint, of_key=True, needs=needs)
+            needs = (self._path, (*self._frame, "parts"))
+            self._report.error("not-applicable", self._path, what, hint, of_key=True, needs=needs)
 
     def _check_after(self, spec: CodingSpec, path: Path) -> None:
         """Check that check values can cover coded bytes: those of a payload with a length."""

@@ -318,6 +318,9 @@ class KindSpec(Fact):
     """One of several kinds of frame."""
 
     parts: Parts = Field(min_length=1, description="Parts in wire order; the first is a constant")
+    coding: Codings | None = Field(
+        default=None, description="How bytes before the terminator travel; a list applies in its order"
+    )
     when: AnyCondition | None = Field(
         default=None, alias="if", description="Direction of its frames: {direction: request}, or response"
     )

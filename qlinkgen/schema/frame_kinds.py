@@ -87,9 +87,14 @@ def build_kinds(file: SchemaFile, builder: FrameBuilder, report: Reporter) -> Fr
 
 
 def begun(kinds: FrameKinds, messages: list[Message], report: Reporter) -> FrameKinds:
-    """The kinds, of which those that begin with the message id know its numbers; checks how they begin."""
+    """The kinds, of which those that begin with the message id know its numbers; checks how they begin.
+
+    A kind with parts of one direction is none in the other if that has no messages.
+    """
     found = []
     for kind in kinds.kinds:
+        if kind.own and not any(kind in kinds.carrying(each.id) for each in messages):
+            continue
         if kind.frame.leading is not None:
             carried = (each.id for each in messages if kind in kinds.carrying(each.id))
             numbers = tuple(sorted({number - kinds.base(kind.family) for number in carried}))
@@ -200,6 +205,11 @@ class _Checker:
         if end is not None and end.constant == frame.preamble:
             what = f"{name} begins with the bytes that end it"
             self._error((*path, end.name), what, "let it begin with other bytes")
+        if frame.coding and end is None:
+            what = f"frames of {name} are coded, and have no terminator"
+            self._error(
+                (*path[:-1], "coding"), what, "add a terminator, or describe the kind in a file of its own"
+            )
         for part in frame.parts:
             if wrong := _excess(part):
                 what = f"{part.name} of {name} {wrong}, which kinds of frame do not have"

@@ -157,9 +157,9 @@ class FrameBuilder:
             )
         )
         parts = PartConditions(specs, path, self._report).added(parts)
-        stuffed, coded_as = (spec.stuffing, spec.coding) if isinstance(spec, FrameSpec) else (None, None)
+        stuffed, coded_as = spec.stuffing if isinstance(spec, FrameSpec) else None, spec.coding
         alone = bool(silence and silence.alone)
-        coding = CodingBuilder(parts, self._parts, self._report, silent=alone).build(coded_as)
+        coding = CodingBuilder(parts, self._parts, self._report, path[:-1], silent=alone).build(coded_as)
         if stuffed:
             self._check_stuffing(parts, path, alone=alone, coded=coded_as is not None)
             insert, names, after = build_stuffing(stuffed, parts, self._parts, self._report)

@@ -224,3 +224,54 @@ def test_only_known_ids_begin_a_frame(wire: str, kind: str) -> None:
         module.decode_request(bytes.fromhex(wire))
     assert refused.value.kind == kind
     assert dissect(plan, bytes.fromhex(wire), "request").kind == kind
+
+
+CODED = """
+qlinkgen: 1
+protocol: {name: coded, revision: "1", source: Made up}
+byteorder: big
+frames:
+  line:
+    parts:
+      start: {text: ":"}
+      code: {role: message, type: u8}
+      data: {role: payload, size: 0..20}
+      lrc: {type: u8, algorithm: sum8-zero, over: [code, data]}
+      end: {role: terminator, value: 0D 0A}
+    coding: {digits: hex}
+  packet:
+    parts:
+      start: 10 02
+      code: {role: message, type: u8}
+      data: {role: payload, size: 0..20}
+      sum: {type: u8, algorithm: sum8, over: [code, data]}
+      close: {role: terminator, value: 10 03}
+    coding: {insert: 10, after: 10}
+bus: {kind: link}
+commands: {}
+messages:
+  greeting: {frame: line, id: 1, fields: {data: bytes}}
+  picture: {frame: packet, id: 2, fields: {data: bytes}}
+"""
+
+
+def test_each_kind_has_a_coding_of_its_own() -> None:
+    protocol, faults = loads(CODED, "coded.yaml")
+    assert protocol is not None, faults
+    plan, generated = plan_of(protocol), load_codec(protocol)
+    codec, data = Codec(plan), bytes.fromhex("10 03 3A 0D 0A")
+    line, packet = codec.encode("greeting", {"data": data}), codec.encode("picture", {"data": data})
+    assert line == b":0110033A0D0A9B\r\n"
+    assert packet == bytes.fromhex("10 02 02 10 10 03 3A 0D 0A 66 10 03")
+    wrong = line.replace(b"3A", b"3G")
+    stream = b"\x10" + packet + wrong + line + packet[:5] + packet
+    found = [event.decoded.message.name if event.decoded else event.kind
+             for event in receiver(plan, "message").run(stream)]  # fmt: skip
+    assert [each for each in found if each in plan.by_name] == ["picture", "greeting", "picture"]
+    assert "stuffing" in found
+    decoder = generated.StreamDecoder()
+    heard = [event for byte in stream for event in decoder.feed(bytes((byte,)))]
+    heard += decoder.finish()
+    assert [getattr(each, "NAME", "") or each.kind for each in heard] == found
+    assert generated.decode(line).data == generated.decode(packet).data == data
+    assert [fault.kind for fault in dissect(plan, wrong, "message").faults] == ["stuffing"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -25,6 +26,7 @@ from qlinkgen.backends.c.views import (
 )
 from qlinkgen.plan.ends import ByMessage
 from qlinkgen.plan.framing import FramePlan
+from qlinkgen.plan.transparency import Coded
 from qlinkgen.plan.tree import Plan
 
 
@@ -108,7 +110,8 @@ class KindsViews:
 
 def kinds_views(plan: Plan, layouts: Layouts) -> KindsViews:
     """The views of a protocol with several kinds of frame."""
-    frame = frame_view(plan, max_wire=plan.frame.max_wire)
+    bodies = [_body_size(each) for each in plan.frame.kinds]
+    frame = frame_view(plan, body_size=max(bodies), max_wire=plan.frame.max_wire)
     kinds = {each.name: _kind(plan, each, frame, layouts) for each in plan.frame.kinds}
     ordered = sorted(plan.frame.kinds, key=lambda each: each.max_payload)
     first = next(iter(kinds.values())).parts
@@ -149,6 +152,12 @@ def _unproven(plan: Plan) -> str:
             tests.append(f"({goes})")
         terms.append(" && ".join(tests) if len(tests) == 1 else f"({' && '.join(tests)})")
     return " || ".join(terms)
+
+
+def _body_size(kind: FramePlan) -> int:
+    """Size of the buffer for decoding a frame, 0 if its bytes are sent as they are."""
+    coded, envelope = kind.transparency, kind.envelope
+    return envelope.overhead + envelope.payload.most if isinstance(coded, Coded) and coded.stages else 0
 
 
 def _goes(plan: Plan, kind: FramePlan, direction: str) -> str:
@@ -203,7 +212,7 @@ def _kind(
         get_values=values,
         own=own_prefix(prefix, kind.name),
         ended=ended_view(writer, frame.pass_decode_direction) if kind.whole else None,
-        frame=replace(frame, direction_unused=frame.needs_direction),
+        frame=replace(frame, direction_unused=frame.needs_direction, body_size=_body_size(kind)),
         whole=replace(parts, id_value=number, address_value=address, get_values=values),
         most=kind.max_payload,
         parts=parts,
@@ -222,7 +231,7 @@ def _carries(frame: FramePlan, kind: FramePlan, bits: int) -> str:
     bases = sorted({each.base for each in frame.kinds})
     if len(bases) == 1:
         return fits
-    step = bases[1]
+    step = math.gcd(*bases)  # a family without messages has no kinds
     shift = step.bit_length() - 1
     family = f"(id >> {shift})" if shift else "id"
     return f"({family} == {unsigned(kind.base // step, bits)}) && ({fits})"

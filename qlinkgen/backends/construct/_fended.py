@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from ._ended import EndedFrame
+from ._ended import Coding, EndedFrame
 from ._fields import Message
 from ._frames import Part
 from ._kinds import AnyKind
@@ -21,6 +21,8 @@ class EndedKind(AnyKind, EndedFrame):
         end: str,
         most: int,
         over: Sequence[str],
+        coding: Sequence[Coding] = (),
+        paired: bool = False,
         base: int = 0,
         least: int = 0,
         address: str = "",
@@ -32,6 +34,8 @@ class EndedKind(AnyKind, EndedFrame):
             end=end,
             most=most,
             over=over,
+            coding=coding,
+            paired=paired,
             least=least,
         )
         self.by_id = {each.id - base: each for each in self.by_name.values()}

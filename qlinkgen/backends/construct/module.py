@@ -218,6 +218,8 @@ def _kinds(plan: Plan, direction: Direction, messages: Mapping[str, str]) -> Cal
         name = "EndedKind" if kind.whole else "Kind"
         if kind.whole:
             settings |= dict(_ended_at(kind))
+            settings |= dict(_codings(kind))
+            settings |= dict(_paired(kind))
         calls.append(Call(name, (Ref(_kind_layout(kind)), chosen), tuple(settings.items())))
     return Call("Kinds", tuple(calls))
 
@@ -354,16 +356,23 @@ def _ended(
     messages: Sequence,
     address: tuple[tuple[str, Node], ...],
 ) -> Call:
-    coded, end = frame.transparency, frame.end
-    assert isinstance(coded, Coded)
     bare = (("bare", True),) if isinstance(frame.receiver, Rescan) and frame.receiver.bare else ()
-    coding = (("coding", Sequence(tuple(map(_stage, coded.stages)))),) if coded.stages else ()
     least = (("least", frame.envelope.payload.least),) if frame.envelope.payload.least else ()
-    paired: tuple[tuple[str, Node], ...] = ()
-    if isinstance(end, ByTerminator):
-        paired = (("paired", True),) if end.paired is not None else ()
-    places = (*_ended_at(frame), *least, *paired)
-    return Call("EndedFrame", (layout, messages), (*address, *bare, *coding, *places))
+    places = (*_ended_at(frame), *least, *_paired(frame))
+    return Call("EndedFrame", (layout, messages), (*address, *bare, *_codings(frame), *places))
+
+
+def _paired(frame: FramePlan) -> Iterator[tuple[str, Node]]:
+    """Whether a terminator and pairs of coded bytes begin alike."""
+    if isinstance(frame.end, ByTerminator) and frame.end.paired is not None:
+        yield "paired", True
+
+
+def _codings(frame: FramePlan) -> Iterator[tuple[str, Node]]:
+    """The codings of a frame that a terminator or a silence ends."""
+    coded = frame.transparency
+    if isinstance(coded, Coded) and coded.stages:
+        yield "coding", Sequence(tuple(map(_stage, coded.stages)))
 
 
 def _ended_at(frame: FramePlan) -> Iterator[tuple[str, Node]]:

@@ -26,9 +26,10 @@ class CodingView:
     take: list[str]
 
 
-def coding_view(stages: tuple[Stage, ...]) -> CodingView:
-    """The statements of codings that apply one after the other."""
-    views = [_view(stage, f"_{index}" if len(stages) > 1 else "") for index, stage in enumerate(stages, 1)]
+def coding_view(stages: tuple[Stage, ...], mark: str = "") -> CodingView:
+    """The statements of codings that apply one after the other; the names of tables end with ``mark``."""
+    numbers = [f"_{index}" if len(stages) > 1 else "" for index in range(1, len(stages) + 1)]
+    views = [_view(stage, mark + number) for stage, number in zip(stages, numbers, strict=True)]
     return CodingView(
         tables=[line for view in views for line in view.tables],
         encode=[line for view in views for line in view.encode],

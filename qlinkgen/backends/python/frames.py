@@ -293,8 +293,8 @@ def _idle(silence: Silence | None) -> tuple[float, float] | None:
     return (float(silence.byte_times), float(silence.seconds)) if silence else None
 
 
-def ended_view(frame: FramePlan, *, bare: bool) -> EndedView:
-    """The view of a terminator, or of a frame that a silence ends."""
+def ended_view(frame: FramePlan, *, bare: bool, mark: str = "") -> EndedView:
+    """The view of a terminator, or of a frame that a silence ends; ``mark`` is that of its kind."""
     envelope, coded, end = frame.envelope, frame.transparency, frame.end
     assert isinstance(coded, Coded)
     last, after, paired = b"", 0, False
@@ -317,7 +317,7 @@ def ended_view(frame: FramePlan, *, bare: bool) -> EndedView:
         lines=frame.lines,
         flag=bool(frame.flag),
         checks=list(_ended_checks(envelope, bare=bare)),
-        coding=coding_view(coded.stages) if coded.stages else None,
+        coding=coding_view(coded.stages, mark) if coded.stages else None,
     )
 
 

@@ -159,6 +159,11 @@ class KindsView:
     idle = None
 
     @property
+    def coded(self) -> bool:
+        """Whether frames of some kinds are coded."""
+        return any(each.ended and each.ended.coding for each in self.kinds)
+
+    @property
     def parted(self) -> bool:
         """Whether the directions have different kinds."""
         return "" not in self.by_first
@@ -259,7 +264,7 @@ def _kind(frame: FramePlan, plan: Plan, make: Maker) -> KindView:
         number=base + _grouped(pieces.number(envelope, envelope.id, "frame"), base),
         address=pieces.number(envelope, envelope.address, "frame") if addressed else "None",
         verified=bool(envelope.checks),
-        ended=ended_view(frame, bare=False) if frame.whole else None,
+        ended=ended_view(frame, bare=False, mark=f"_{frame.name.upper()}") if frame.whole else None,
         least=envelope.payload.least,
         most=envelope.payload.most,
         lead=literal(envelope.preamble),

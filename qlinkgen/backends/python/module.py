@@ -353,8 +353,9 @@ def _check_makers(views: Sequence[AnyView]) -> set[str]:
 
 
 def _has_digits(plan: Plan) -> bool:
-    coded = plan.frame.transparency
-    return isinstance(coded, Coded) and any(isinstance(stage, Digits) for stage in coded.stages)
+    codings = [each.transparency for each in plan.frame.every]
+    stages = [stage for each in codings if isinstance(each, Coded) for stage in each.stages]
+    return any(isinstance(stage, Digits) for stage in stages)
 
 
 def _has_after(views: Sequence[AnyView]) -> bool:

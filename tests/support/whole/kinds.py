@@ -82,6 +82,9 @@ def draw(rng: random.Random) -> Kinds:
         shape.bus = families[0].shape.bus
         frames["line"] = {"parts": shape.frame["parts"]}
         families.append(Family(shape, "line", ended=True))
+    coded = random.Random(f"coded {more.getstate()!r}")
+    if coded.random() < 0.35:
+        families.append(_coded(coded, frames, leads.pop(), families[0].shape.bus))
     _add_one_way(random.Random(repr(more.getstate())), frames, families)
     mixed = list(frames)
     rng.shuffle(mixed)
@@ -93,7 +96,8 @@ def lead_with_ids(rng: random.Random, several: Kinds) -> None:
     for family in rng.sample(several.families, len(several.families)):
         parts = several.frames[family.name]["parts"] if family.name else {}
         code = parts.get("code", {})
-        if code.get("role") != "message" or "group" in parts or family.ended or rng.random() < 0.1:
+        ended = family.ended or family.name == "coded"
+        if code.get("role") != "message" or "group" in parts or ended or rng.random() < 0.1:
             continue
         size = int(code["type"][1:]) // 8
         starts = {number.to_bytes(size, "big")[:1] for number in family.ids}
@@ -137,6 +141,28 @@ def _ended(rng: random.Random, lead: str) -> Shape:
         parts["last"] = rng.choice(("0A", "0D 0A"))
     least, most = map(int, parts["data"]["size"].split(".."))
     return Shape("kinds", {"parts": parts}, least, most, 7, "", has_length=True)
+
+
+def _coded(rng: random.Random, frames: Doc, lead: str, bus: str) -> Family:
+    """A kind of frame with a terminator that its coding keeps from occurring before."""
+    shape = _ended(rng, lead)
+    shape.bus = bus
+    parts = shape.frame["parts"]
+    end = parts["close"]["value"].split()[-1]
+    codings: list[tuple[str, Doc | list[Doc]]] = [
+        (parts["close"]["value"], {"escape": "7D", "xor": "20", "of": [end, "7D"]}),
+        ("C0", {"replace": {"C0": "DB DC", "DB": "DB DD"}}),
+        ("00", {"cobs": "00"}),
+        (parts["close"]["value"], {"digits": "hex"}),
+        ("00 8A", [{"add": "21"}, {"cobs": "00"}]),
+        ("DB 03", {"insert": "DB", "after": "DB"}),
+        ("C0", [{"pair": "complement"}, {"replace": {"C0": "DB DC", "DB": "DB DD"}}]),
+    ]
+    parts["close"]["value"], coding = rng.choice(codings)
+    if "digits" in coding:
+        parts["close"]["value"] = "80"
+    frames["coded"] = {"parts": parts, "coding": coding}
+    return Family(shape, "coded")
 
 
 def _add_values(rng: random.Random, frames: Doc, families: list[Family]) -> None:

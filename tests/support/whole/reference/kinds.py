@@ -38,15 +38,19 @@ class Kinds:
         self.shared = tuple(name for name in self.frames if name not in named)
         #: The largest payload of any kind.
         self.most = max(frame.most for frame in self.frames.values())
+        sent = list(self._messages())
+        for way, frames in self.ways.items():
+            carried = {name for each in sent if each.direction in (way, "message") for name in each.frames}
+            for name in [name for name, frame in frames.items() if frame.one_way and name not in carried]:
+                del frames[name]
         for way, frames in self.ways.items():
             for name, frame in frames.items():
                 if not frame.starts:
                     ways = (
                         (way,) if frame.one_way or "if" in data["frames"][name] else (*self.ways, "message")
                     )
-                    sent = [each for each in self._messages() if each.direction in ways]
-                    carried = {each.number for each in sent if name in each.frames}
-                    frame.starts = tuple(put(frame.parts[0].pieces, number) for number in carried)
+                    numbers = {each.number for each in sent if each.direction in ways and name in each.frames}
+                    frame.starts = tuple(put(frame.parts[0].pieces, number) for number in numbers)
                     frame.bare = False
 
     def messages(self) -> Iterator[Message]:
@@ -137,10 +141,10 @@ def address_of(data: Doc) -> str | None:
 
 def _whole(spec: Doc) -> Doc:
     """The parts of a kind, with an empty payload before what follows it if it has none."""
-    parts = dict(spec["parts"])
+    parts, more = dict(spec["parts"]), {key: spec[key] for key in ("coding",) if key in spec}
     roles = [part_doc(each)["role"] for each in parts.values()]
     if "payload" in roles:
-        return {"parts": parts}
+        return {"parts": parts, **more}
     name = "payload"
     while name in parts:
         name += "_"
@@ -148,7 +152,7 @@ def _whole(spec: Doc) -> Doc:
     at = max(held, default=0) + 1
     found = list(parts.items())
     found.insert(at, (name, {"role": "payload", "size": 0}))
-    return {"parts": dict(found)}
+    return {"parts": dict(found), **more}
 
 
 def _values_of(node: Any, key: str) -> Iterator[Any]:
