@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, SupportsInt, assert_never
@@ -43,6 +43,18 @@ class Layout:
     def open(self) -> bool:
         """Whether a field takes the rest of the bytes."""
         return any(each.open for each in self.fields)
+
+    def takes_rest(self, values: Mapping[str, object]) -> bool:
+        """Whether a record with these native or raw values takes all bytes that are left."""
+        for each in self.fields:
+            inner = values.get(each.slot or each.name)
+            if not each.open or not applies(each.when, values.get):
+                continue
+            if not isinstance(each.type, Record) or not isinstance(inner, Mapping):
+                return True
+            if each.type.layout.takes_rest(inner):
+                return True
+        return False
 
     @cached_property
     def values(self) -> tuple[Value, ...]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 
 from qlinkgen.model.condition import Condition
-from qlinkgen.model.fields import Field, Layout, Record, Records, applies
+from qlinkgen.model.fields import Field, Layout, Record, Records
 from qlinkgen.model.types import Array, Length, Scalar
-from qlinkgen.model.values import Native, defaults_of
+from qlinkgen.model.values import defaults_of
 from qlinkgen.schema.bit_items import bit_types
 from qlinkgen.schema.compounds import build_length
 from qlinkgen.schema.conditions import EndBuilder
@@ -99,7 +99,7 @@ class RecordBuilder:
             what = f"{rest} takes the rest of the payload, so that a second {layout.name} has no bytes"
             hint = f"put a count before {rest}, give it an if, or use one {layout.name}"
             location.fault("bad-record", "type", what, hint)
-        elif length.minimum > 1 and _is_open(layout, defaults_of(layout)):
+        elif length.minimum > 1 and layout.takes_rest(defaults_of(layout)):
             what = f"a new {layout.name} takes the rest of the payload, so that a second one has no bytes"
             hint = "give the tested field another default, or the array a minimum of 1"
             location.fault("bad-record", "type", what, hint)
@@ -181,18 +181,6 @@ def _always_open(layout: Layout) -> str:
         if each.open and not each.when and (not isinstance(kind, Record) or _always_open(kind.layout)):
             return each.slot or each.name
     return ""
-
-
-def _is_open(layout: Layout, values: Mapping[str, Native]) -> bool:
-    """Whether a record with these values takes the rest of the payload."""
-    for each in layout.fields:
-        if each.open and applies(each.when, values.get):
-            inner = values.get(each.slot or each.name)
-            if not isinstance(each.type, Record) or not isinstance(inner, Mapping):
-                return True
-            if _is_open(each.type.layout, inner):
-                return True
-    return False
 
 
 def _depth(fields: tuple[Field, ...]) -> int:

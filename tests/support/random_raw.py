@@ -24,13 +24,16 @@ def random_values(message: Message, rng: random.Random) -> list[Raw]:
     return [_random(value, rng) for value in message.values]
 
 
-def random_present(values: Iterable[Value], rng: random.Random) -> dict[str, Raw]:
-    """Legal raw values by name; those that are absent are None, of a choice that of its case."""
+def random_present(values: Iterable[Value], rng: random.Random, *, most: int | None = None) -> dict[str, Raw]:
+    """Legal raw values by name; those that are absent are None, of a choice that of its case.
+
+    ``most`` limits the number of records and of bytes, where they may be as few.
+    """
     found: dict[str, Raw] = {}
     for value in values:
         sent = applies(value.field.when, found.get)
         if sent or found.get(value.name) is None:
-            found[value.name] = _random(value, rng) if sent else None
+            found[value.name] = _random(value, rng, most) if sent else None
     return found
 
 
@@ -57,8 +60,9 @@ def random_address(message: Message, rng: random.Random) -> int:
 
 def random_frame(plan: Plan, message: Message, rng: random.Random) -> bytes:
     """A frame of legal values, made by the interpreter."""
-    for _ in range(200):
-        values = random_present(message.values, rng) | random_beside(plan.protocol, message, rng)
+    for attempt in range(200):
+        drawn = random_present(message.values, rng, most=8 if attempt else None)
+        values = drawn | random_beside(plan.protocol, message, rng)
         try:
             return Codec(plan).encode(message.name, values, random_address(message, rng))
         except Unsendable:  # records of variable size can be too many together
@@ -86,18 +90,18 @@ def damaged(stream: bytes, rng: random.Random, alphabet: bytes) -> bytes:
     return bytes(data)
 
 
-def _random(value: Value, rng: random.Random) -> Raw:
+def _random(value: Value, rng: random.Random, most: int | None = None) -> Raw:
     kind = value.type
     match kind:
         case Scalar():
             return _number(kind, rng)
         case Array():
-            return [_number(kind.item, rng) for _ in range(_size(kind.length, rng))]
+            return [_number(kind.item, rng) for _ in range(_size(kind.length, rng, most))]
         case Blob():
             if kind.excluded:  # between separators
                 plain = [each for each in range(0x21, 0x7F) if each not in kind.excluded]
-                return bytes(rng.choice(plain) for _ in range(_size(kind.length, rng)))
-            size = rng.randint(0, kind.length.maximum) if kind.pad else _size(kind.length, rng)
+                return bytes(rng.choice(plain) for _ in range(_size(kind.length, rng, most)))
+            size = rng.randint(0, kind.length.maximum) if kind.pad else _size(kind.length, rng, most)
             data = bytes(
                 rng.choice((rng.randrange(256), 0xA5, 0x00, 0xFF, 0xFD)) & (0x7F if kind.text else 0xFF)
                 for _ in range(size)
@@ -105,24 +109,37 @@ def _random(value: Value, rng: random.Random) -> Raw:
             data = data.replace(kind.terminator, b"_") if kind.terminator else data
             return data.rstrip(kind.pad) if kind.pad else data
         case Record():
-            return _record(kind.layout, rng)
+            return _record(kind.layout, rng, most)
         case Records():
-            records = [_record(kind.layout, rng) for _ in range(_size(kind.length, rng))]
-            return _ended(kind, records, rng) if kind.last else records
+            records = [_record(kind.layout, rng, most) for _ in range(_size(kind.length, rng, most))]
+            closed = [_closed(kind, each, rng, most) for each in records[:-1]] + records[-1:]
+            return _ended(kind, closed, rng, most) if kind.last else closed
         case _:
             assert_never(kind)
 
 
-def _record(layout: Layout, rng: random.Random) -> Mapping[str, Raw]:
-    return random_present(layout.values, rng)
+def _record(layout: Layout, rng: random.Random, most: int | None) -> Mapping[str, Raw]:
+    return random_present(layout.values, rng, most=most)
 
 
-def _ended(kind: Records, records: list[Mapping[str, Raw]], rng: random.Random) -> list[Mapping[str, Raw]]:
+def _closed(
+    kind: Records, record: Mapping[str, Raw], rng: random.Random, most: int | None
+) -> Mapping[str, Raw]:
+    """The record, or another one that leaves bytes for those after it."""
+    while kind.layout.takes_rest(record):
+        record = _record(kind.layout, rng, most)
+    return record
+
+
+def _ended(
+    kind: Records, records: list[Mapping[str, Raw]], rng: random.Random, most: int | None
+) -> list[Mapping[str, Raw]]:
     """Records of which the last one alone meets the condition of a last one."""
     for index in range(len(records)):
         final = index == len(records) - 1
         while all(test.holds(_raw(records[index][test.value])) for test in kind.last) != final:
-            records[index] = _record(kind.layout, rng)
+            new = _record(kind.layout, rng, most)
+            records[index] = new if final else _closed(kind, new, rng, most)
     return records
 
 
@@ -131,8 +148,9 @@ def _raw(number: Raw) -> int:
     return number
 
 
-def _size(length: Length, rng: random.Random) -> int:
+def _size(length: Length, rng: random.Random, most: int | None) -> int:
     low, high = length.minimum, length.maximum
+    high = high if most is None else max(low, min(high, most))
     return rng.choice((low, high, rng.randint(low, high), min(high, low + rng.randint(0, 4))))
 
 
