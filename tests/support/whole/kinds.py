@@ -198,10 +198,10 @@ def _add_one_way(rng: random.Random, frames: Doc, families: list[Family]) -> Non
     named = {each.name for each in families}
     for each in families:
         own = [each.name] if each.name else [name for name in frames if name not in named]
-        if rng.random() < 0.65 or set(frames[own[0]]["parts"]) == {"byte"}:
+        if rng.random() < 0.65 or not names or set(frames[own[0]]["parts"]) == {"byte"}:
             continue
         each.shape.directed = True
-        for _ in range(rng.choice((1, 1, 2))):
+        for _ in range(min(len(names), rng.choice((1, 1, 2)))):
             name = names.pop(rng.randrange(len(names)))
             way = {"if": {"direction": rng.choice(("request", "response", "not request"))}}
             place, covered = rng.random() / 2 if each.ended else rng.random(), rng.random() < 0.7
