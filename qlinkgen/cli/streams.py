@@ -144,6 +144,14 @@ class EitherWay:
             self._asked = self._asked if not any(new.values()) else None
 
     def _choose(self, new: dict[Direction, list[Event]]) -> Direction:
+        """Of two messages that end together, one may be data at the end of the other."""
+        asking, telling = (_last_message(new[way]) for way in ("request", "response"))
+        if asking is not None and telling is not None:
+            request, response = asking.to_frame(), telling.to_frame()
+            if request != response and request.endswith(response):
+                return "request"
+            if request != response and response.endswith(request):
+                return "response"
         return "response" if self._asked == _transaction(_last_message(new["response"])) else "request"
 
     def _deliver(self, way: Direction, new: dict[Direction, list[Event]]) -> list[Event]:

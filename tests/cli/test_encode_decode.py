@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import load_protocol
 from qlinkgen.cli.streams import EitherWay, open_stream
+from qlinkgen.schema import loads
 from tests.cli.conftest import Run
 from tests.cli.test_boundary import COMMAND, ENVIRONMENT
 
@@ -472,3 +473,39 @@ commands: {read: {id: 1, request: {text: text}, response: {}}}
     assert kinds == ["crc", "length", "read.request", "read.response", "read.request"]
     assert len(decoded(qlinkgen, schema, "01 41", "42 84")) == 1
     assert "one frame on each line" in qlinkgen("decode", schema, "--raw", stdin=b"\1").err
+
+
+H4 = """
+qlinkgen: 1
+protocol: {name: h4, revision: "1", source: Made up}
+byteorder: little
+frames:
+  command:
+    if: {direction: request}
+    parts:
+      kind: 01
+      opcode: {role: message, type: u16}
+      length: {type: u8, counts: data}
+      data: {role: payload, size: 0..255}
+  event:
+    if: {direction: response}
+    parts:
+      kind: 04
+      code: {role: message, type: u8}
+      length: {type: u8, counts: data}
+      data: {role: payload, size: 0..255}
+bus: {kind: master_slave}
+defaults: {addressing: none, repeat: safe, frame: command}
+messages:
+  complete: {frame: event, id: 14, direction: response, fields: {packets: u8, opcode: u16, rest: bytes}}
+commands:
+  reset: {id: 0x0C03, request: {}, response: complete}
+"""
+
+
+def test_a_request_at_the_end_of_an_answer_is_data() -> None:
+    protocol, faults = loads(H4, "h4.yaml")
+    assert protocol is not None, faults
+    stream = open_stream(protocol, load_codec(protocol), None)
+    events = [*stream.feed(bytes.fromhex("01 03 0C 00 04 0E 04 01 03 0C 00")), *stream.finish()]
+    assert [getattr(event, "NAME", event) for event in events] == ["reset.request", "complete"]
