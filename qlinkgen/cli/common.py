@@ -74,6 +74,14 @@ def find_message(protocol: Protocol, name: str) -> Message:
         raise Failure(f"{protocol.name} has no message '{name}'; {hint}") from None
 
 
+def turned_message(protocol: Protocol, name: str) -> Message:
+    """Find a message that only its turn in a dialogue tells."""
+    message = find_message(protocol, name)
+    if not protocol.is_turned(message):
+        raise Failure(f"--message {name}: its frame tells what it is; omit the option")
+    return message
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Return a hint with the closest known words, or ""."""
     close = similar(word, known, most=2)

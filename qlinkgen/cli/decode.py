@@ -15,11 +15,19 @@ import click
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.codec import fields, load_codec
-from qlinkgen.cli.common import crc_option, load_protocol, parse_hex, version_option, warn, warn_unconfirmed
+from qlinkgen.cli.common import (
+    crc_option,
+    load_protocol,
+    parse_hex,
+    turned_message,
+    version_option,
+    warn,
+    warn_unconfirmed,
+)
 from qlinkgen.cli.conversations import Answers, Conversation
 from qlinkgen.cli.encode import asked
 from qlinkgen.cli.hex_text import HexError, HexReader
-from qlinkgen.cli.streams import Bad, Event, Stream, open_stream
+from qlinkgen.cli.streams import Alone, Bad, Event, Stream, open_stream
 from qlinkgen.link.codec import Fault, Message
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import address_attribute, attribute, record_key
@@ -42,6 +50,7 @@ _COMMENT = re.compile(rb"#[^\n]*")
 @click.option(
     "--request", "request", metavar="HEX", help="The request of the responses, where these depend on it."
 )
+@click.option("--message", "name", metavar="MESSAGE", help="What HEX is, where only its turn tells it.")
 @click.option("--raw", is_flag=True, help="Standard input is binary, not hex text.")
 @crc_option
 @version_option
@@ -50,6 +59,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     hex_: tuple[str, ...],
     direction: Direction | None,
     request: str | None,
+    name: str | None,
     raw: bool,
     crc: str | None,
     version: str | None,
@@ -77,6 +87,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     loaded = load_protocol(protocol, crc, version)
     codec = load_codec(loaded)
     stream = _stream(loaded, codec, direction, request)
+    if name is not None:
+        stream = Alone(codec, turned_message(loaded, name).name)
     gaps = frame_plan(loaded.frame).silent
     if gaps and raw:
         what = f"only a silence ends a frame of {loaded.name}, and raw bytes have no times"

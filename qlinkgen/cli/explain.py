@@ -7,7 +7,14 @@ from collections.abc import Iterator, Sequence
 import click
 
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
-from qlinkgen.cli.common import crc_option, load_protocol, on_terminal, parse_hex, version_option
+from qlinkgen.cli.common import (
+    crc_option,
+    load_protocol,
+    on_terminal,
+    parse_hex,
+    turned_message,
+    version_option,
+)
 from qlinkgen.cli.findings import finding, notes
 from qlinkgen.cli.span_text import value_of
 from qlinkgen.cli.streams import PROGRESS
@@ -33,6 +40,7 @@ Line = tuple[int, str, str, str, bool]
 @click.option(
     "--request", "request", metavar="HEX", help="Packets: the request; HEX is then only its response."
 )
+@click.option("--message", "name", metavar="MESSAGE", help="What HEX is, where only its turn tells it.")
 @crc_option
 @version_option
 def command(  # noqa: PLR0917  # click passes them by name
@@ -40,6 +48,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     hex_: tuple[str, ...],
     direction: Direction | None,
     request: str | None,
+    name: str | None,
     crc: str | None,
     version: str | None,
 ) -> int:
@@ -51,13 +60,20 @@ def command(  # noqa: PLR0917  # click passes them by name
     \b
     qlinkgen explain qlink a5a50783 01a500ffa500e305
     qlinkgen explain mc1231a 4a 0012d687d6e3
+    qlinkgen explain stm32 --message read_memory.place 0800000008
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc, version)
     data = parse_hex(" ".join(hex_))
     if not data:
         raise Failure("HEX is empty; give the bytes of one frame")
     asked = None if request is None else parse_hex(request, "--request")
-    found, hints = explained(plan_of(loaded), data, direction, asked)
+    plan = plan_of(loaded)
+    if name is not None:
+        message = plan.message(turned_message(loaded, name).name)
+        told = dissect(plan, data, message.direction, turned=message)
+        found, hints = [told], notes(told)
+    else:
+        found, hints = explained(plan, data, direction, asked)
     _show(found, hints)
     return WRONG if any(each.kind for each in found) else FINE
 

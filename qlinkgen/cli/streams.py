@@ -18,7 +18,7 @@ from qlinkgen.cli.codec import MessageObject
 from qlinkgen.link.codec import Fault, Framed, Message, address_of, is_message
 from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol as Described
-from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator
+from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator, ByTurn
 from qlinkgen.plan.framing import FramePlan, frame_plan
 
 #: Kinds of faults in the order of the checks: of two faults, the later one is reported.
@@ -67,6 +67,28 @@ class OneWay:
 
     def _placed(self, event: Framed | Fault) -> Event:
         return event if is_message(event) else _bad(event, self._base)
+
+
+class Alone:
+    """The bytes of one message that only its turn in a dialogue tells."""
+
+    def __init__(self, codec: ModuleType, name: str) -> None:
+        """Decode the message with this name."""
+        self._codec, self._name, self._data = codec, name, b""
+
+    def feed(self, data: bytes) -> list[Event]:
+        """Take bytes."""
+        self._data += data
+        return []
+
+    def finish(self) -> Iterator[Event]:
+        """The end of the stream."""
+        data, self._data = self._data, b""
+        if data:
+            try:
+                yield self._codec.MESSAGES[self._name].from_bytes(data)
+            except self._codec.DecodeError as error:
+                yield Bad(error.kind, 0, data, str(error))
 
 
 class InStep:
@@ -244,7 +266,7 @@ def _ends_alike(frame: FramePlan) -> bool:
             return not any(each.only for each in frame.kinds) and all(map(_ends_alike, frame.kinds))
         case ByLength() | ByTerminator():
             return bool(frame.envelope.starts)
-        case ByMark() | BySilence():
+        case ByMark() | BySilence() | ByTurn():
             return True
         case ByMessage():
             return False

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, final
 
 from qlinkgen.link.codec import Command, Framed, StepSpan
+from qlinkgen.link.turn import Collected, Misread, has_turns, is_turned
 
 #: A later frame of a master: a message, or a function that makes it from the answers so far.
 Further = Framed | Callable[[Sequence[Any]], Framed]  # Any: answers of several classes
@@ -30,11 +31,14 @@ class Progress:
         at: number of the frame that is due; the first one after the request is 0.
     """
 
-    __slots__ = ("_steps", "at")
+    __slots__ = ("_collected", "_command", "_steps", "at")
 
     def __init__(self, command: Command) -> None:
+        self._command = command
         self._steps = command.steps
         self.at = 0
+        #: The bytes so far of a frame that only its turn tells.
+        self._collected: Collected | None = None
 
     @property
     def ended(self) -> bool:
@@ -57,6 +61,19 @@ class Progress:
         return None if self.ended else self._steps[self.at][1]
 
     @property
+    def is_turned(self) -> bool:
+        """Only its turn tells the frame that is due."""
+        return is_turned(self.due)
+
+    def collect(self, byte: bytes, asked: Framed, wrong: type[Exception]) -> Framed | Misread | None:
+        """Take the next byte of the frame that is due, see `Collected`."""
+        if self._collected is None:
+            kind = self.due
+            assert is_turned(kind)
+            self._collected = Collected(kind, self._command, asked)
+        return self._collected.take(byte, wrong)
+
+    @property
     def within(self) -> StepSpan | None:
         """Time limit of the frame that is due, None without one."""
         return None if self.ended else self._steps[self.at][2]
@@ -70,19 +87,24 @@ class Progress:
         """Pass over a frame of the master or the slave; return whether it was due."""
         if self.ended or self.sends is not sent or type(message) is not self.due:
             return False
-        self.at += 1
+        self._move(self.at + 1)
         return True
+
+    def _move(self, at: int) -> None:
+        self.at = at
+        self._collected = None
 
 
 class Conversation(Progress):
     """A dialogue as a master leads it.
 
     Attributes:
+        has_turns: only their turn tells some of its frames.
         answers: the answers so far.
         sent: what the master has sent last.
     """
 
-    __slots__ = ("_further", "_request", "_sends", "_sent_at", "answers", "sent")
+    __slots__ = ("_further", "_request", "_sends", "_sent_at", "answers", "has_turns", "sent")
 
     def __init__(self, command: Command, request: Framed, further: Sequence[Further]) -> None:
         """Check what the master is going to send.
@@ -101,13 +123,14 @@ class Conversation(Progress):
         for given, kind in zip(further, kinds, strict=True):
             if not callable(given):
                 _check(given, kind)
+        self.has_turns = has_turns(command)
         self._further = further
         self._request = request
         self.restart()
 
     def restart(self) -> None:
         """Begin again at the request."""
-        self.at = 0
+        self._move(0)
         self.answers: list[Framed] = []
         self.sent = self._request
         self._sends = 0
@@ -116,7 +139,7 @@ class Conversation(Progress):
     def answer(self, message: Framed) -> None:
         """Take an answer that is due."""
         self.answers.append(message)
-        self.at += 1
+        self._move(self.at + 1)
 
     def next(self) -> Framed:
         """Return the message that the master sends next; the place moves on."""
@@ -126,14 +149,15 @@ class Conversation(Progress):
         _check(self.sent, kind)
         self._sent_at = self.at, len(self.answers)
         self._sends += 1
-        self.at += 1
+        self._move(self.at + 1)
         return self.sent
 
     def back(self) -> bool:
         """Return to the last frame that the master sent after the request; False if there is none."""
         if not self._sends:
             return False
-        self.at, known = self._sent_at
+        at, known = self._sent_at
+        self._move(at)
         del self.answers[known:]
         self._sends -= 1
         return True

@@ -289,9 +289,23 @@ class MasterEngine:
         if self._gap.passed(now):
             self._end_frame(now)
         self._received = data
-        for event in self._decoder.feed(data):
-            self._take_in(event, now)
+        if self._dialogue is not None and self._dialogue.has_turns:
+            for byte in data:
+                self._take_byte(bytes((byte,)), self._dialogue, now)
+        else:
+            for event in self._decoder.feed(data):
+                self._take_in(event, now)
         self._gap.heard(now)
+
+    def _take_byte(self, byte: bytes, dialogue: Conversation, now: float) -> None:
+        """Pass a byte to the message that is due if only its turn tells that, otherwise to the decoder."""
+        if self._state is WAITING and dialogue.receives and dialogue.is_turned:
+            event = dialogue.collect(byte, self._pending.asked, self.codec.DecodeError)
+            if event is not None:
+                self._take_in(event, now)
+            return
+        for found in self._decoder.feed(byte):
+            self._take_in(found, now)
 
     def _end_frame(self, now: float) -> None:
         """The line was idle, or a request follows: bytes inside a damaged frame may be a message."""
@@ -555,7 +569,8 @@ class MasterEngine:
         pending, node = self._pending, self._address(message)
         if not dialogue.receives or type(message) is not dialogue.due:
             return False
-        right = pending.answered_by(message, node) if dialogue.is_last_answer else node == pending.node
+        last = dialogue.is_last_answer
+        right = pending.answered_by(message, node) if last else pending.from_asked(node)
         if not right:
             return False
         cut(pending.command.definition, pending.asked, message)

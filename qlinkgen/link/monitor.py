@@ -32,6 +32,7 @@ from qlinkgen.link.gaps import Gap
 from qlinkgen.link.many import Answers, Stop, is_endless
 from qlinkgen.link.timing import Timing
 from qlinkgen.link.transaction import Accepts
+from qlinkgen.link.turn import has_turns
 
 
 class Asked(NamedTuple):
@@ -153,6 +154,7 @@ class Monitor:
             name: Stop(command, codec) for name, command in codec.COMMANDS.items() if is_endless(command)
         }
         self._answer_to = answer_to(codec)
+        self._turns = any(has_turns(command) for command in codec.COMMANDS.values())
         self._gap = Gap(timing.silence)
 
     @property
@@ -167,11 +169,36 @@ class Monitor:
         self.bytes += len(data)
         for byte in data:
             piece = bytes((byte,))
+            if self._turns and (pending := self._in_turn(now)) is not None:
+                self._collect(pending, piece, now)
+                continue
             asking = self._requests.feed(piece)
             answering = self._responses.feed(piece)
             if asking or answering:
                 self._sort(asking, answering, now)
         self._gap.heard(now)
+
+    def _in_turn(self, now: float) -> _Pending | None:
+        """The request in whose dialogue a frame is due that only its turn tells, None without one."""
+        for each in self._asking:
+            if each.dialogue is not None and each.dialogue.is_turned and now <= each.deadline:
+                return each
+        return None
+
+    def _collect(self, pending: _Pending, byte: bytes, now: float) -> None:
+        """Pass a byte to the message that is due."""
+        dialogue = pending.dialogue
+        assert dialogue is not None
+        event = dialogue.collect(byte, pending.asked, self._codec.DecodeError)
+        if event is None:
+            return
+        if not is_message(event):
+            pending.dialogue = None
+            self.heard.append(Damaged(now, address_of(pending.request), event))
+        elif dialogue.sends:
+            self._message(event, None, now)
+        else:
+            self._message(None, event, now)
 
     def finish(self, now: float) -> None:
         """End the stream."""

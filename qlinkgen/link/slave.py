@@ -24,6 +24,7 @@ from qlinkgen.link.many import nodes_asked
 from qlinkgen.link.numbering import numbering_of, repeat, repeated_of
 from qlinkgen.link.slave_dialogue import PENDING, Answers, Handling, Refusal, SlaveDialogue
 from qlinkgen.link.slave_streams import Flows
+from qlinkgen.link.turn import has_turns
 from qlinkgen.link.unknown import unknown_requests
 
 __all__ = ["PENDING", "Node", "Refusal", "SlaveCounters", "SlaveEngine"]
@@ -150,6 +151,8 @@ class SlaveEngine:
         self._parts = {
             kind for each in self._dialogues.values() for who, kind, _ in each.steps if who == "send"
         }
+        self._has_turns = any(map(has_turns, self._dialogues.values()))
+        self._wrong = codec.DecodeError
         self._dialogue: SlaveDialogue | None = None
         self._flows = Flows(codec, self._checked)
         self._decoder = decoder or codec.StreamDecoder("request")
@@ -176,9 +179,26 @@ class SlaveEngine:
             self._unknown.received(data, now)
         if self._gap.passed(now):
             self._sort(self._decoder.finish(), now)
-        self._sort(self._decoder.feed(data), now)
+        if self._has_turns:
+            for byte in data:
+                self._last = bytes((byte,))
+                self._take_byte(self._last, now)
+        else:
+            self._sort(self._decoder.feed(data), now)
         if data:
             self._gap.heard(now)
+
+    def _take_byte(self, byte: bytes, now: float) -> None:
+        """Pass a byte to the message that is due if only its turn tells that, otherwise to the decoder."""
+        dialogue = self._dialogue
+        if dialogue is None or not dialogue.awaits_turn(now):
+            self._sort(self._decoder.feed(byte), now)
+            return
+        event = dialogue.collect(byte, dialogue.asked, self._wrong)
+        if event is not None:
+            self._sort((event,), now)
+            if not is_message(event):
+                self._leave()
 
     def _sort(self, events: Sequence[Framed | Fault], now: float) -> None:
         for event in events:

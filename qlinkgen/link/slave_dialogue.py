@@ -47,17 +47,20 @@ class SlaveDialogue(Progress):
         left: it is over.
     """
 
-    __slots__ = ("_command", "_handling", "_heard_at", "asked", "left", "request", "until")
+    __slots__ = ("_handling", "_heard_at", "asked", "left", "request", "until")
 
     def __init__(self, command: Command, request: Framed, handling: Handling | None) -> None:
         """Without ``handling``, the handler has given all answers to the request at once."""
         super().__init__(command)
-        self._command = command
         self._handling = handling
         self._heard_at = 0
         self.request = self.asked = request
         self.until: float | None = None
         self.left = False
+
+    def awaits_turn(self, now: float) -> bool:
+        """Whether a frame of the master is due, in time, that only its turn tells."""
+        return not self.left and self.sends and self.is_turned and (self.until is None or now <= self.until)
 
     def begin(self) -> Answers:
         """Return the answers to the request."""
@@ -109,7 +112,7 @@ class SlaveDialogue(Progress):
                 raise ValueError(f"{each.NAME} is not due in {self._command.name}: {due} is")
             meaning = reply.meaning(each)
             if meaning == "again":
-                self.at = self._heard_at
+                self._move(self._heard_at)
             elif meaning != "pending":
                 self.leave()
         if self.ended:

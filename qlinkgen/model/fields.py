@@ -201,6 +201,21 @@ class Field:
                 assert_never(self.type)
 
     @property
+    def item_bits(self) -> int:
+        """Bits of an item of a list, bytes or text; 0 for a single value."""
+        match self.type:
+            case Array():
+                return self.type.item.bits if self.type.packed else 8 * self.type.item.size
+            case Blob():
+                return 8
+            case Records():
+                return 8 * self.type.layout.size
+            case Record() | Scalar() | Bits():
+                return 0
+            case _:
+                assert_never(self.type)
+
+    @property
     def most(self) -> int:
         """Maximum number of items, 1 for a single value."""
         return self.type.length.maximum if isinstance(self.type, Blob | Array | Records) else 1

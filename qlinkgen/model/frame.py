@@ -297,6 +297,11 @@ class DelimitedFrame:
         return self.parts[0].constant
 
     @property
+    def turned(self) -> bool:
+        """Whether only the turn of a frame in its dialogue tells it: it is its payload."""
+        return len(self.parts) == 1 and self.parts[0].role == "payload"
+
+    @property
     def leading(self) -> PartBits | None:
         """The message id if a frame begins with all of it, else None."""
         first = self.parts[0]
@@ -478,6 +483,8 @@ class FrameKinds:
     """
 
     kinds: tuple[FrameKind, ...]
+    #: Most messages of a kind that only their turn tells; they are numbered in their order.
+    turned: int = 0
 
     kind = "kinds"
 
@@ -488,7 +495,8 @@ class FrameKinds:
     @cached_property
     def number_bits(self) -> int:
         """Bits of the longest number of a message in a frame."""
-        return max(sum(bits.bits for bits in each.frame.id_bits) for each in self.kinds)
+        own = max(sum(bits.bits for bits in each.frame.id_bits) for each in self.kinds)
+        return max(own, max(0, self.turned - 1).bit_length())
 
     def base(self, family: int) -> int:
         """What is added to the number of a message of a family."""
@@ -497,6 +505,10 @@ class FrameKinds:
     def carrying(self, number: int) -> tuple[FrameKind, ...]:
         """The kinds that carry the message with an id."""
         return tuple(each for each in self.kinds if each.family == number >> self.number_bits)
+
+    def is_turned(self, number: int) -> bool:
+        """Whether only its turn tells the message with an id."""
+        return all(each.frame.turned for each in self.carrying(number))
 
     @property
     def address(self) -> PartBits | None:

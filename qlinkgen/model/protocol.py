@@ -81,6 +81,10 @@ class Protocol:
         """The message that carries answers which only their request tells apart, None without any."""
         return next((each for each in self.messages if each.carries), None)
 
+    def is_turned(self, message: Message) -> bool:
+        """Whether only its turn in a dialogue tells a message."""
+        return isinstance(self.frame, FrameKinds) and self.frame.is_turned(message.id)
+
     def is_asked(self, message: Message) -> bool:
         """Whether only its request tells a message from others."""
         carrier = self.carrier

@@ -224,6 +224,16 @@ class Codec:
         except NoFrame as no_frame:
             raise BadFrame(no_frame.kind, no_frame.at) from None
 
+    def decode_as(self, message: MessagePlan, wire: bytes, request: bytes = b"") -> Decoded:
+        """The frame of a message, which may be told by its turn alone. Raises BadFrame."""
+        if not message.turned:
+            return self.decode(wire, self.plan.direction_of(message), request)
+        try:
+            values = content.unpack(message.payload, wire)
+        except BadContent as bad:
+            raise BadFrame(bad.kind, len(wire), bad.field) from None
+        return Decoded(message, None, values, wire, {})
+
     def _decode(self, wire: bytes, direction: Direction, request: bytes) -> Decoded:
         frame, known = self.plan.frames[direction], self.plan.known(direction)
         match frame.receiver:

@@ -36,6 +36,7 @@ from qlinkgen.plan.ends import (
     ByMessage,
     BySilence,
     ByTerminator,
+    ByTurn,
     Gaps,
     Hunt,
     InStep,
@@ -517,7 +518,7 @@ def id_text(frame: FramePlan, number: int) -> str:
     match end:
         case ByMark():
             return str(number)
-        case ByLength() | ByMessage() | ByTerminator() | BySilence():
+        case ByLength() | ByMessage() | ByTerminator() | BySilence() | ByTurn():
             return f"0x{number:02X}"
         case ByKind():
             base = max(each.base for each in frame.kinds if each.base <= number)
@@ -558,6 +559,8 @@ def _end_text(frame: FramePlan) -> str:
         case BySilence():
             assert frame.idle is not None
             return f"{idle_text(frame.idle)} alone"
+        case ByTurn():
+            return "only its turn in a dialogue tells a frame, whose size follows from the message"
         case ByMark():
             return f"the next byte with bit 0x{end.header.marker:02X} set"
         case ByKind():
@@ -633,7 +636,7 @@ def _start_text(kind: FramePlan) -> str:
 def receiver_text(frame: FramePlan) -> tuple[str, str]:
     """The strategy of a receiver, and its reason."""
     way = frame.receiver
-    beginnings = dict.fromkeys(each for kind in frame.every if (each := _start_text(kind)))
+    beginnings = dict.fromkeys(each for kind in frame.sought if (each := _start_text(kind)))
     preamble = " or ".join(beginnings)
     match way:
         case Hunt():

@@ -17,7 +17,7 @@ from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.coding import Add, Bytewise
 from qlinkgen.plan.content import BadContent, MoreNeeded, broken, measure
-from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator, Hunt
+from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator, ByTurn, Hunt
 from qlinkgen.plan.fields import Fields
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
@@ -44,16 +44,26 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 Named = Part | Step | Member | None
 
 
-def dissect(plan: Plan, wire: bytes, direction: Direction, request: bytes = b"") -> Dissection:
-    """Dissect exactly one frame; ``request`` is the frame that it answers."""
+def dissect(
+    plan: Plan, wire: bytes, direction: Direction, request: bytes = b"", turned: MessagePlan | None = None
+) -> Dissection:
+    """Dissect exactly one frame; ``request`` is the frame that it answers.
+
+    ``turned`` is the message of a frame that only its turn tells.
+    """
     codec = Codec(plan)
     try:
-        codec.decode(wire, direction, request)
+        if turned is None:
+            codec.decode(wire, direction, request)
+        else:
+            codec.decode_as(turned, wire)
     except BadFrame as bad:
         kind = bad.kind
     else:
         kind = ""
     frame = plan.frames[direction]
+    if turned is not None:
+        return _TurnedWalk(codec, wire, direction, request, kind, turned).run()
     frame = _kind_of(frame, wire) if frame.kinds else frame
     walk = _EndedWalk if frame.whole else _Walk
     return walk(codec, wire, direction, request, kind).run()
@@ -64,7 +74,7 @@ def _kind_of(frame: FramePlan, wire: bytes) -> FramePlan:
     kinds = [(first, each) for each in frame.kinds for first in each.envelope.starts]
     begun = (each for first, each in kinds if first.startswith(wire[: len(first)]))
     held = [(at, each) for first, each in kinds if (at := wire.find(first)) >= 0]
-    return next(begun, min(held, key=lambda each: each[0])[1] if held else frame.every[0])
+    return next(begun, min(held, key=lambda each: each[0])[1] if held else frame.sought[0])
 
 
 def request_size(plan: Plan, wire: bytes) -> int:
@@ -265,6 +275,8 @@ class _Walk:
                     return
             case ByMark():
                 size = self._marked_size(end)
+            case ByTurn():
+                size = self._left()
             case ByTerminator() | BySilence() | ByKind():
                 raise AssertionError("the terminator or the kind is found first")
             case ByMessage() if self.frame.needs_request:
@@ -643,6 +655,20 @@ class _Walk:
         """All offsets that represent bytes, and what is there."""
         own = tuple(each for place in places for each in self.units.get(place, (place,)))
         return own, bytes(self.wire[at] for at in own)
+
+
+class _TurnedWalk(_Walk):
+    """Checks a frame that is the payload of a known message."""
+
+    def __init__(  # noqa: PLR0917  # as for other frames
+        self, codec: Codec, wire: bytes, direction: Direction, request: bytes, kind: str, message: MessagePlan
+    ) -> None:
+        super().__init__(codec, wire, direction, request, kind)
+        self.frame, self.envelope, self._known = message.frames[-1], message.envelope, message
+        self.message, self.number = message, message.id
+
+    def _identify(self) -> None:
+        self.message, self.number = self._known, self._known.id
 
 
 class _EndedWalk(_Walk):

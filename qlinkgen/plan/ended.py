@@ -143,7 +143,7 @@ class EndedReader(FrameReader):
 def frame_reader(plan: FramePlan, known: Mapping[int, MessagePlan]) -> FrameReader | KindsReader:
     """The reader of frames of parts; ``known`` are the messages of their direction, by number."""
     if plan.kinds:
-        return KindsReader([(each, _reader(each, known)) for each in plan.kinds])
+        return KindsReader([(each, _reader(each, known)) for each in plan.sought])
     return _reader(plan, known)
 
 

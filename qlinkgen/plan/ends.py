@@ -62,7 +62,12 @@ class ByKind:
     """Each kind of frame has an end of its own."""
 
 
-End = ByLength | ByMessage | ByMark | ByTerminator | BySilence | ByKind
+@dataclass(frozen=True, slots=True)
+class ByTurn:
+    """Only the turn of a frame in its dialogue tells it: receivers do not look for it."""
+
+
+End = ByLength | ByMessage | ByMark | ByTerminator | BySilence | ByKind | ByTurn
 
 
 # How a receiver finds frames

@@ -34,6 +34,7 @@ from qlinkgen.plan.ends import (
     ByMessage,
     BySilence,
     ByTerminator,
+    ByTurn,
     End,
     Gaps,
     Hunt,
@@ -111,6 +112,16 @@ class FramePlan:
         return self if found == self.kinds else _several(found)
 
     @property
+    def turned(self) -> bool:
+        """Whether only its turn in a dialogue tells a frame."""
+        return isinstance(self.end, ByTurn)
+
+    @property
+    def sought(self) -> tuple[FramePlan, ...]:
+        """The kinds of frame that receivers look for, or the only one."""
+        return tuple(each for each in self.every if not each.turned)
+
+    @property
     def every(self) -> tuple[FramePlan, ...]:
         """The kinds of frame, or the only one."""
         return self.kinds or (self,)
@@ -185,9 +196,9 @@ class FramePlan:
 
     @property
     def max_wire(self) -> int:
-        """Maximum size on the wire of a frame, valid or not."""
+        """Maximum size on the wire of a frame that receivers look for, valid or not."""
         if self.kinds:
-            return max(each.max_wire for each in self.kinds)
+            return max(each.max_wire for each in self.sought)
         most = self.envelope.max_frame
         stuffing = self.transparency
         return stuffing.most_frame(most) if isinstance(stuffing, FrameStuffing | Coded) else most
@@ -266,7 +277,10 @@ def _kinds(frame: FrameKinds) -> tuple[FramePlan, ...]:
     """Each kind has a plan of its own."""
     return tuple(
         replace(
-            _delimited(each.frame, "response"), name=each.title, base=frame.base(each.family), only=each.only
+            _delimited(each.frame, "response"),
+            name=each.title,
+            base=frame.base(each.family),
+            only=each.only,
         )
         for each in frame.kinds
     )
@@ -274,7 +288,7 @@ def _kinds(frame: FrameKinds) -> tuple[FramePlan, ...]:
 
 def _several(kinds: tuple[FramePlan, ...]) -> FramePlan:
     """Frames of several kinds."""
-    receivers = [each.receiver for each in kinds]
+    receivers = [each.receiver for each in kinds if not each.turned]
     return FramePlan(
         envelope=Envelope(()),
         end=ByKind(),
@@ -302,6 +316,8 @@ def _delimited(whole: DelimitedFrame, direction: Direction) -> FramePlan:
         end = ByTerminator(part, envelope.from_end(part) - part.size, stated.shared, frame.paired)
     if frame.ends_idle:
         end = BySilence()
+    if frame.turned:
+        end = ByTurn()
     return FramePlan(
         envelope=envelope,
         end=end,

@@ -12,7 +12,7 @@ from typing import assert_never
 
 from qlinkgen.plan.coding import Bytewise, Insertion
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure
-from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator, Rescan
+from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator, ByTurn, Rescan
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
     AddressPart,
@@ -343,8 +343,8 @@ class FrameReader:
                 sent = self._take(cursor, part, end.part.payload(length))
             case ByMessage():
                 sent = self._measured(cursor, part, taken)
-            case ByMark() | ByTerminator() | BySilence() | ByKind():
-                raise AssertionError("marks, a terminator, a silence or the kind are found first")
+            case ByMark() | ByTerminator() | BySilence() | ByKind() | ByTurn():
+                raise AssertionError("marks, a terminator, a silence, the kind or the turn are found first")
             case _:
                 assert_never(end)
         taken.cells[part.name] = sent

@@ -91,6 +91,11 @@ class MessagePlan:
         return self.envelope if frame is self.frames[-1] else frame.envelope
 
     @property
+    def turned(self) -> bool:
+        """Whether only its turn in a dialogue tells it, so its frame is its payload."""
+        return bool(self.frames) and self.frames[-1].turned
+
+    @property
     def checked(self) -> bool:
         """Whether it has a check value."""
         return self.envelope.check is not None
@@ -171,7 +176,13 @@ class Plan:
 
     def received(self, direction: Direction) -> tuple[MessagePlan, ...]:
         """Messages that a decoder for a direction accepts, those that both sides send included."""
-        return tuple(m for m in self.messages if m.direction in (direction, "message") and not m.asked)
+        given = (each for each in self.messages if each.direction in (direction, "message"))
+        return tuple(each for each in given if not each.asked and not each.turned)
+
+    @property
+    def turned(self) -> tuple[MessagePlan, ...]:
+        """Messages that only their turn in a dialogue tells."""
+        return tuple(each for each in self.messages if each.turned)
 
     @cached_property
     def asked(self) -> Mapping[str, tuple[MessagePlan, ...]]:
@@ -186,6 +197,18 @@ class Plan:
             if asked:
                 found[command.request.name] = asked
         return found
+
+    def turn_of(self, message: MessagePlan) -> tuple[int, int]:
+        """Bytes of a turned message without a list that an earlier frame counts, and bits of an item of that.
+
+        Both are 0 if the message gives its size itself.
+        """
+        for command in self.protocol.commands:
+            if command.sizes and command.response is message.message:
+                ((name, _),) = command.sizes
+                listed = next(each for each in message.message.fields if each.name == name)
+                return message.message.min_size - listed.min_size, listed.item_bits
+        return 0, 0
 
     def is_first(self, message: MessagePlan) -> bool:
         """Whether a message is the answer to its request whenever its payload is valid."""

@@ -108,10 +108,9 @@ class _Checker:
         """What the bytes say; None if that was reported."""
         from qlinkgen.plan.reading import BadFrame  # noqa: PLC0415  # see build_examples
 
-        place, plan = (*path, "wire"), self._codec.plan
-        direction = plan.direction_of(plan.message(message.name))
+        place, planned = (*path, "wire"), self._codec.plan.message(message.name)
         try:
-            decoded = self._codec.decode(spec.wire, direction, spec.after)
+            decoded = self._codec.decode_as(planned, spec.wire, spec.after)
         except BadFrame as bad:
             why = _WRONG.get(bad.kind, f"{bad.kind} at byte {bad.end}")
             what = f"this is not a frame of {message.name}: {why}"

@@ -11,6 +11,7 @@ from qlinkgen.model.message import Message
 from qlinkgen.schema.file_commands import AnswerSpec, StepMessageSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.frames import FrameBuilder
+from qlinkgen.schema.layouts import own_steps
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.part_directions import stated_direction
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -62,6 +63,7 @@ def build_kinds(file: SchemaFile, builder: FrameBuilder, report: Reporter) -> Fr
     named = {name for name, _ in named_kinds(file)}
     ways = [(name, frame, way) for name, frame, only in built for way in _ways(frame, only)]
     families = list(dict.fromkeys((name if name in named else "", way) for name, _, way in ways))
+    steps = sum(1 for name, spec in file.commands.items() for _ in own_steps(name, spec))
     kinds = FrameKinds(
         tuple(
             FrameKind(
@@ -72,7 +74,8 @@ def build_kinds(file: SchemaFile, builder: FrameBuilder, report: Reporter) -> Fr
                 f"{name}_{way}" if frame.directed else "",
             )
             for name, frame, way in ways
-        )
+        ),
+        steps if any(frame.turned for _, frame, _ in built) else 0,
     )
     checker = _Checker(report)
     for name, frame, _ in built:
@@ -103,7 +106,7 @@ def begun(kinds: FrameKinds, messages: list[Message], report: Reporter) -> Frame
             kind = replace(kind, frame=replace(kind.frame, parts=(first, *kind.frame.parts[1:])))  # noqa: PLW2901
         found.append(kind)
     _Checker(report).starts(found)
-    return FrameKinds(tuple(found))
+    return replace(kinds, kinds=tuple(found))
 
 
 def _built(
@@ -134,8 +137,9 @@ def family_frame(kinds: FrameKinds, family: int) -> DelimitedFrame:
     return replace(largest, parts=tuple(payload if p is largest.payload else p for p in largest.parts))
 
 
-def check_used(kinds: FrameKinds, messages: list[Message], report: Reporter) -> None:
-    """Check that each kind carries a message, and which kinds only answers may have."""
+def check_used(file: SchemaFile, kinds: FrameKinds, messages: list[Message], report: Reporter) -> None:
+    """Check that each kind carries a message, and which kinds only answers or steps may have."""
+    steps = {f"{name}.{step.name}" for name, spec in file.commands.items() for step in own_steps(name, spec)}
     used = {each.name for message in messages for each in kinds.carrying(message.id)}
     _check_repeated(kinds, messages, report)
     for name in dict.fromkeys(each.name for each in kinds.kinds):
@@ -144,24 +148,30 @@ def check_used(kinds: FrameKinds, messages: list[Message], report: Reporter) -> 
             hint = "remove it, or let a message name it"
             report.error(_RULE, ("frames", name), what, hint, of_key=True, needs=(("commands",),))
     for kind in kinds.kinds:
-        for message in messages:
-            asks = message.direction != "response" and kind in kinds.carrying(message.id)
-            if asks and kinds.address and not kind.frame.address:
-                what = (
-                    f"{message.name} is not an answer, and its frame has no address, which other kinds have"
-                )
-                hint = "let only responses and replies have this kind, or give it the address"
+        carried = [each for each in messages if kind in kinds.carrying(each.id)]
+        for message in carried:
+            if kind.frame.turned and message.name not in steps:
+                what = f"{message.name} is not a step, and nothing but its turn tells a frame of {kind.name}"
+                hint = "let only steps have this kind, or begin it with a constant or the message id"
                 report.error(_RULE, ("frames", kind.name), what, hint, of_key=True)
-        size = sum(part.size for part in kind.frame.parts) + kind.frame.payload.max_size
-        if size > _SHORT or kind.frame.part("checksum") or kind.frame.complemented:
-            continue
-        for message in messages:
-            if message.direction != "response" and kind in kinds.carrying(message.id):
-                counted = f"{size} byte{'s' if size > 1 else ''}"
-                what = f"{message.name} is not an answer, and its frame of {counted} has no check value"
-                hint = "any byte of noise may be one; only a response or a reply has such a frame, or one "
-                hint += "that is a byte and its complement"
-                report.error("short-frame", ("frames", kind.name), what, hint, of_key=True)
+        _check_asking(kinds, kind, [each for each in carried if each.direction != "response"], report)
+
+
+def _check_asking(kinds: FrameKinds, kind: FrameKind, asking: list[Message], report: Reporter) -> None:
+    """Check that a kind may carry messages that are not answers."""
+    path: Path = ("frames", kind.name)
+    for message in asking if kinds.address and not kind.frame.address else ():
+        what = f"{message.name} is not an answer, and its frame has no address, which other kinds have"
+        hint = "let only responses and replies have this kind, or give it the address"
+        report.error(_RULE, path, what, hint, of_key=True)
+    size = sum(part.size for part in kind.frame.parts) + kind.frame.payload.max_size
+    proven = kind.frame.part("checksum") or kind.frame.complemented or kind.frame.turned
+    for message in asking if size <= _SHORT and not proven else ():
+        counted = f"{size} byte{'s' if size > 1 else ''}"
+        what = f"{message.name} is not an answer, and its frame of {counted} has no check value"
+        hint = "any byte of noise may be one; only a response or a reply has such a frame, or one "
+        hint += "that is a byte and its complement"
+        report.error("short-frame", path, what, hint, of_key=True)
 
 
 def _check_repeated(kinds: FrameKinds, messages: list[Message], report: Reporter) -> None:
@@ -194,7 +204,7 @@ class _Checker:
             if frame.part("terminator"):
                 what = f"{name} begins with its message id and ends with a terminator"
                 self._error((*path, first), what, "begin it with a constant, or give it a length")
-        elif not frame.preamble:
+        elif not frame.preamble and not frame.turned:
             what = f"{name} begins with {first}, not with constant bytes"
             hint = "begin each kind with a constant that tells it from the others, or with the message id"
             self._error((*path, first), what, hint)

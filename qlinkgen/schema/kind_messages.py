@@ -50,6 +50,10 @@ class KindMessages:
         """Whether any kind has an address."""
         return self._kinds.address is not None
 
+    def turned(self, message: Message) -> bool:
+        """Whether only its turn tells a message."""
+        return self._kinds.is_turned(message.id)
+
     @property
     def numbered(self) -> tuple[str, ...]:
         """Counters of the frame that answers repeat."""

@@ -166,7 +166,7 @@ def _build(
     commands = CommandBuilder(file, report, messages, frame, bus)
     commands.build()
     if isinstance(frame, FrameKinds):
-        check_used(frame, commands.messages, report)
+        check_used(file, frame, commands.messages, report)
         frame = begun(frame, commands.messages, report)
     transactions = EchoBuilder(file, frame, messages.places, report).build(commands.commands)
     check_terminator(frame, commands.messages, report)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from typing import Literal, NamedTuple, assert_never
 
@@ -84,6 +86,8 @@ class MessageBuilder:
         self.places: dict[str, Path] = {}
         self.id_places: dict[str, Path] = {}
         self._ids = IdBuilder(report, frame)
+        #: Numbers of messages that only their turn tells.
+        self._turned = itertools.count()
         self.asked = AskedBuilder(file, report, fields, frame)
 
     @property
@@ -92,6 +96,10 @@ class MessageBuilder:
         if isinstance(self._frame, DelimitedFrame):
             return self._frame.address is not None
         return isinstance(self._frame, MarkedFrame)
+
+    def turned(self, message: Message) -> bool:  # noqa: ARG002  # as of several kinds of frame
+        """Whether only its turn tells a message: that takes several kinds of frame."""
+        return False
 
     @property
     def numbered(self) -> tuple[str, ...]:
@@ -194,6 +202,9 @@ class MessageBuilder:
         usual = path in (("commands", command, "id"), ("messages", name, "id"))
         stated = StatedId(None) if layout.inherited and not self._ids.identifies else layout.number
         whose = "" if usual else name
+        if isinstance(self._frame, DelimitedFrame) and self._frame.turned:
+            self._ids.number(stated, direction, path, whose)
+            return self._base + next(self._turned)
         return self._base + self._ids.number(stated, direction, path, whose, way=layout.way)
 
     def _added(self, message: Message, layout: Written) -> Message:
@@ -201,7 +212,7 @@ class MessageBuilder:
             message = replace(message, limit=self._limits()[1])
         self.places[message.name] = layout.path
         self.id_places[message.name] = layout.number_path
-        self._check(message, layout.path)
+        self._check(message, layout.path, frozenset(layout.asked))
         return message
 
     def single(self, name: str, spec: MessageSpec) -> Message:
@@ -275,7 +286,7 @@ class MessageBuilder:
 
     # Checks against the frame
 
-    def _check(self, message: Message, path: Path) -> None:
+    def _check(self, message: Message, path: Path, asked: AbstractSet[str]) -> None:
         if self._frame is None:
             return
         self._check_size(message, path)
@@ -290,7 +301,7 @@ class MessageBuilder:
             for field in message.fields:
                 self._check_marker(field, self._frame.marker, path)
             return
-        self._check_end(message, path)
+        self._check_end(message, path, asked)
         self._check_steps(message, path)
         if isinstance(self._frame, PacketFrame):
             self._check_words(message, self._frame.word_size, path)
@@ -334,11 +345,18 @@ class MessageBuilder:
             what = f"an empty {message.name} is one of zeros, which are not sent"
             self._error("bad-trim", (*path[:-1], "empty_request"), what, "remove empty_request")
 
-    def _check_end(self, message: Message, path: Path) -> None:
+    def _check_end(self, message: Message, path: Path, asked: AbstractSet[str]) -> None:
         """Check that the fields determine the end of a frame without a length or terminator."""
         if isinstance(self._frame, DelimitedFrame) and self._frame.tells_end:
             return
+        turned = isinstance(self._frame, DelimitedFrame) and self._frame.turned
+        if turned and not message.min_size:
+            what = f"{message.name} may have no byte, so it is over before it begins"
+            self._error("no-frame-end", path, what, "give it at least one byte")
         for field in message.fields:
+            if turned and field.name in asked:
+                self._check_asked(message, field, asked, path)
+                continue
             if (field.open or _has_terminator(field)) and not message.separator:
                 neither = f"neither the frame nor {message.name} has a length"
                 what = f"the end of {field.name} is unknown: {neither}"
@@ -353,6 +371,15 @@ class MessageBuilder:
         if message.empty_is_default and message.max_size:
             what = f"an empty {message.name} cannot be distinguished from a full one: the frame has no length"
             self._error("no-frame-end", (*path[:-1], "empty_request"), what, "remove empty_request")
+
+    def _check_asked(self, message: Message, field: Field, asked: AbstractSet[str], path: Path) -> None:
+        """Check that an earlier frame gives the size of a message."""
+        varying = [each for each in message.variable if each is not field]
+        odd = field.walked or field.terminated or field.conditional
+        if varying or odd or message.separator or len(asked) > 1:
+            what = f"the number of items of {field.name} alone does not give the size of {message.name}"
+            hint = "give all other fields, and each item, constant sizes; or the kind of frame a length"
+            self._error("no-frame-end", (*path, field.name), what, hint)
 
     def _check_steps(self, message: Message, path: Path) -> None:
         """Check that a length in steps of several bytes can state the size of the message."""

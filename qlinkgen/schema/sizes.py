@@ -72,14 +72,26 @@ def _bounds(
         what = f"{text} has no field {shown(name)}"
         hint = did_you_mean(name, known, f"its fields are {listed(known)}")
         report.error("unknown-type", path, what, hint)
-    elif not isinstance(kind, Scalar) or kind.scaling is not None or kind.meaning is not None:
+    elif not isinstance(kind, Scalar) or not _counts(kind):
         report.error(
             "bad-array", path, f"{name} of {text} is not a number of items", "use an unsigned integer"
         )
-    elif kind.minimum < 0 or kind.maximum == 0:
-        what = f"{name} of {text} may be {kind.minimum}..{kind.maximum}"
+    elif _number(kind, kind.minimum) < 0 or _number(kind, kind.maximum) == 0:
+        what = f"{name} of {text} may be {_number(kind, kind.minimum)}..{_number(kind, kind.maximum)}"
         report.error("bad-array", path, what, "give it a range of numbers of items, like 1..125")
     else:
-        return kind.minimum, kind.maximum
+        return _number(kind, kind.minimum), _number(kind, kind.maximum)
     report.taint(path)
     return None
+
+
+def _counts(kind: Scalar) -> bool:
+    """Whether a number may be one of items: it is whole, and grows with the raw one."""
+    scaling = kind.scaling
+    whole = scaling is None or (scaling.divisor == 1 and scaling.factor > 0)
+    return whole and kind.meaning is None
+
+
+def _number(kind: Scalar, raw: int) -> int:
+    """The number of items that a raw number says."""
+    return raw if kind.scaling is None else raw * kind.scaling.factor + kind.scaling.bias

@@ -178,9 +178,13 @@ class StepBuilder:
             message = self._inline(asked, own, frames, sent=sent) if own else None
         if message is None:
             return None
-        if not sent and within is None:
+        turned = self._messages.turned(message)
+        if within is None and (not sent or turned):
             limit = asked.spec.response_within or self._file.bus.response_within
             within = Allowance(limit.byte_times, limit.seconds) if limit else Allowance()
+            if turned and sent and not limit:
+                what = f"{message.name} is told by its turn, and nothing else ends the wait for it"
+                self._error(path, what, "add within: 1 s, or response_within to the bus")
         return Step(message, sent, within)
 
     def _inline(self, asked: Asked, step: OwnStep, frames: Mapping[str, Message], *, sent: bool) -> Message:

@@ -11,6 +11,7 @@ from qlinkgen.link.asked import answer_to
 from qlinkgen.link.codec import Codec, Command, Echoes, Framed, Many, Message, is_message
 from qlinkgen.link.many import is_endless, nodes_asked
 from qlinkgen.link.slave_dialogue import Handling
+from qlinkgen.link.turn import is_turned
 from qlinkgen.plan import Plan
 from qlinkgen.plan.codec import Codec as Interpreter
 from qlinkgen.plan.content import with_decided
@@ -138,6 +139,8 @@ class GenericNode:
         settled = with_decided(plan.payload, told)
         address = self.number if message.ADDRESS else None
         wire = interpreter.encode(message.NAME, settled, address, asked)
+        if is_turned(type(message)):
+            return type(message).from_bytes(wire)
         (heard,) = filter(is_message, self._codec.StreamDecoder("response").feed(wire))
         make = answer_to(self._codec)
         return make(request, heard) if make else heard

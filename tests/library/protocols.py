@@ -47,6 +47,7 @@ PEERS: Mapping[str, tuple[str, str]] = {
     "ppp": ("yahdlc", "python4yahdlc"),
     "shdlc": ("sensirion_shdlc_driver", "sensirion-shdlc-driver"),
     "slip": ("sliplib", "sliplib"),
+    "stm32": ("stm32loader", "stm32loader"),
     "tmcl": ("pytrinamic", "pytrinamic"),
     "ubx": ("pyubx2", "pyubx2"),
     "visca": ("pyvisca", "pyvisca"),
@@ -98,10 +99,19 @@ class Described:
         """A frame of random values, made by the interpreter."""
         return random_frame(self.plan, message, rng)
 
+    def record_of(self, message: Message, wire: bytes) -> Record:
+        """The record of a frame of a message, which may be told by its turn alone."""
+        planned = self.plan.message(message.name)
+        if planned.turned:
+            return self._record(self.module.MESSAGES[message.name].from_bytes(wire))
+        return self.record(wire, self.plan.direction_of(planned))
+
     def record(self, wire: bytes, direction: Direction) -> Record:
         """The record of a frame, read by the generated decoder, with numbers as JSON has them."""
         suffix = "" if direction == "message" else f"_{direction}"
-        found = getattr(self.module, f"decode{suffix}")(wire)
+        return self._record(getattr(self.module, f"decode{suffix}")(wire))
+
+    def _record(self, found: Any) -> Record:
         plain: Record = json.loads(json.dumps(message_record(self.model, found), default=float))
         return plain
 

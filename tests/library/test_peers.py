@@ -32,7 +32,7 @@ def test_random_messages_are_those_of_the_peer(name: str) -> None:
         rng = random.Random(message.name)
         for _ in range(max(20, MESSAGES // len(ours.model.messages))):
             wire = ours.wire(message, rng)
-            record = ours.record(wire, direction)
+            record = ours.record_of(message, wire)
             assert ours.encoded(record) == wire
             built, read = other.build(record), other.read(wire, direction)
             if built is not None:

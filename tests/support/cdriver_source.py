@@ -135,6 +135,15 @@ class _Source:
             "    const size_t size = from_hex(word(), bytes_a);",
             "    int status;",
         )
+        if isinstance(frame := self.protocol.frame, FrameKinds) and frame.is_turned(message.id):
+            self._add(
+                f"    status = {decode};",
+                "    if (status != @P@_OK) { fail(status); return; }",
+                '    printf("ok 0");',
+                shown,
+                "}",
+            )
+            return
         if self.packet and message.direction == "response":
             self._add(
                 f"    status = {function}_from_frame({call}@SUM@bytes_a, size);".replace("@SUM@", self._sum())

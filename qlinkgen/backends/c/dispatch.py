@@ -298,12 +298,24 @@ def _initial(command: Command, sent: Message, answer: Message, address: str) -> 
     if answer is not command.response:
         return []
     fields = {field.name: field for field in answer.fields}
+    numbers = {value.name: value.type for value in sent.values}
     sizes = [
-        f"response.{name}_{fields[name].quantity} = ({count_type(fields[name].most)})request.{member(asked)};"
+        f"response.{name}_{fields[name].quantity} = "
+        f"({count_type(fields[name].most)}){_number(numbers[asked], f'request.{member(asked)}')};"
         for name, asked in (command.sizes if sent is command.sized_by else ())
         if not fields[name].fixed
     ]
     return [*sizes, *of_response(command, sent, answer, address)]
+
+
+def _number(kind: FieldType, raw: str) -> str:
+    """The number of items that a raw number says."""
+    scaling = kind.scaling if isinstance(kind, Scalar) else None
+    if scaling is None:
+        return raw
+    number = f"(size_t){raw}"
+    number = f"({number} * {scaling.factor}U)" if scaling.factor > 1 else number
+    return f"({number} {'-' if scaling.bias < 0 else '+'} {abs(scaling.bias)}U)"
 
 
 def turn_name(names: Names, message: Message) -> str:
@@ -319,6 +331,12 @@ def turns(names: Names, exchanges: Iterable[Exchange], kept: Iterable[Message]) 
         for each in exchanges
         if each.turn and each.sent.name in present
     ]
+
+
+def awaited(names: Names, exchanges: Iterable[Exchange], kept: Iterable[MessagePlan]) -> list[str]:
+    """The constants of messages of a slave's dialogues that only their turn tells."""
+    turned = {each.name for each in kept if each.turned and each.decoded}
+    return [names.constant(each.sent) for each in exchanges if each.turn and each.sent.name in turned]
 
 
 def dialogues(names: Names, commands: Iterable[Command]) -> list[DialogueEntry]:

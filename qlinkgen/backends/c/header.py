@@ -23,7 +23,7 @@ from qlinkgen.backends.c.messages import Beside, MessageWriter, Rounding, neares
 from qlinkgen.backends.c.names import Names
 from qlinkgen.backends.c.places import in_hex
 from qlinkgen.backends.c.several import several
-from qlinkgen.backends.c.sizes import SizeView, size_view, sized_by_message
+from qlinkgen.backends.c.sizes import SizeView, size_view, sized_by_message, turn_view
 from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.backends.c.types import Kind, Types
 from qlinkgen.backends.c.views import FrameView, own_prefix
@@ -254,7 +254,9 @@ class Header:
         if self._plan.role == "master" and self._section.slave_only:
             return []
         section = self._section
-        return [self._frame_part(section.receiver, section.view, section.views)]
+        found = [self._frame_part(section.receiver, section.view, section.views)]
+        turn = turn_view(self._plan, self._names, self._layouts)
+        return found + ([self._place("turn", f=section.view, turn=turn)] if turn else [])
 
     def _dispatch(self) -> str:
         section, commands, role = self._section, self._plan.commands, self._plan.role
@@ -278,6 +280,7 @@ class Header:
             carrier=dispatch.carrier(self._names, self._plan),
             transactions=dispatch.transactions(self._protocol, self._names.upper, commands),
             turns=dispatch.turns(self._names, self._protocol.exchanges.values(), self._kept),
+            awaited=dispatch.awaited(self._names, self._protocol.exchanges.values(), self._plan.messages),
             dialogues=dispatch.dialogues(self._names, commands) if listens else [],
             before=max((each.listed for each in slave if each.listed), key=attrgetter("most"), default=None),
             streams=[each.begins for each in slave if each.begins],

@@ -48,6 +48,7 @@ class KindView:
         unused: parameters that the function that wraps does not use.
         get_values: statements that read the values of a received frame.
         own: what the names of its functions begin with.
+        turned: only its turn tells it, so it is its payload.
         starts: rows of the message ids that its frames begin with, [] if a constant begins them.
         ended: its terminator, None without one; then ``frame`` and ``whole`` are views for its template.
     """
@@ -72,6 +73,7 @@ class KindView:
     parts: PartsView
     plain: PlainView
     starts: Sequence[str]
+    turned: bool
 
     @property
     def start_size(self) -> int:
@@ -81,7 +83,10 @@ class KindView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KindsView:
-    """Several kinds of frame: in their order, and those that wrap in the order of their payloads."""
+    """Several kinds of frame: in their order, and those that wrap in the order of their payloads.
+
+    Receivers do not look for those that only their turn tells.
+    """
 
     kinds: Sequence[KindView]
     wrapped: Sequence[KindView]
@@ -91,6 +96,11 @@ class KindsView:
     def parted(self) -> bool:
         """Whether some kinds go one direction alone."""
         return any(each.goes for each in self.kinds)
+
+    @property
+    def sought(self) -> Sequence[KindView]:
+        """The kinds that receivers look for."""
+        return [each for each in self.kinds if not each.turned]
 
     @property
     def lasts(self) -> Sequence[str]:
@@ -114,7 +124,7 @@ def kinds_views(plan: Plan, layouts: Layouts) -> KindsViews:
     frame = frame_view(plan, body_size=max(bodies), max_wire=plan.frame.max_wire)
     kinds = {each.name: _kind(plan, each, frame, layouts) for each in plan.frame.kinds}
     ordered = sorted(plan.frame.kinds, key=lambda each: each.max_payload)
-    first = next(iter(kinds.values())).parts
+    first = kinds[plan.frame.sought[0].name].parts
     return KindsViews(
         algorithms=list(_writer(plan, plan.frame.kinds[0], layouts).algorithms.values()),
         f=frame,
@@ -135,7 +145,7 @@ def kinds_views(plan: Plan, layouts: Layouts) -> KindsViews:
 def _unproven(plan: Plan) -> str:
     """The condition for a received frame of a kind without check value, "" if all have one."""
     terms = []
-    for kind in plan.frame.kinds:
+    for kind in plan.frame.sought:
         if kind.envelope.checks:
             continue
         goes = _goes(plan, kind, "receiver->direction")
@@ -218,6 +228,7 @@ def _kind(
         parts=parts,
         plain=plain_view(writer, frame.pass_decode_direction),
         starts=[] if kind.envelope.preamble else [_row(start) for start in kind.envelope.starts],
+        turned=kind.turned,
     )
 
 

@@ -15,7 +15,7 @@ from qlinkgen.plan.ends import ByMessage
 from qlinkgen.plan.expr import Size, Term, Within
 from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan, Place
 from qlinkgen.plan.planning import payload_plan
-from qlinkgen.plan.tree import MessagePlan
+from qlinkgen.plan.tree import MessagePlan, Plan
 
 #: Prints the number of items of a run as a size_t.
 Count = Callable[[str], str]
@@ -148,6 +148,25 @@ class SizeView:
 def size_view(names: Names, message: MessagePlan, layouts: Layouts) -> SizeView:
     """The view of a message for the template."""
     return SizeView(names.constant(message.message), _statements(Learner(message.payload, layouts)))
+
+
+@dataclass(frozen=True, slots=True)
+class TurnView:
+    """The messages that only their turn tells: the size of the largest, and those that give their size."""
+
+    most: int
+    sizes: list[SizeView]
+
+
+def turn_view(plan: Plan, names: Names, layouts: Layouts) -> TurnView | None:
+    """The view of the messages that only their turn tells; None if none are received."""
+    received = [each for each in plan.turned if each.decoded]
+    if not received:
+        return None
+    told = [each for each in received if plan.turn_of(each) == (0, 0)]
+    return TurnView(
+        max(each.payload.most for each in received), [size_view(names, each, layouts) for each in told]
+    )
 
 
 def _statements(learner: Learner) -> list[str]:

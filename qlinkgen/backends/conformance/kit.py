@@ -100,7 +100,9 @@ class KitView:
     receives: bool
     has_handlers: bool
     has_callbacks: bool
+    frame_id_type: str
     checks: list[str]
+    turned: list[str]
 
 
 class Kit:
@@ -150,6 +152,7 @@ class Kit:
             place_type=_unsigned(8 * values if records else values + 8 * members),
             has_records=records,
             has_choices=choices,
+            frame_id_type=f"uint{header.id_bits}_t",
             id_type=_unsigned((1 << header.id_bits) - 1),
             number_type=_unsigned(tests),
             member_type="uint8_t" if members <= 0xFF else "uint16_t",
@@ -178,7 +181,8 @@ class Kit:
             receives=any(each.received for each in entries),
             has_handlers=any(each.slave_member for each in entries),
             has_callbacks=any(each.callback_member for each in entries),
-            checks=sorted({each.received_as for each in entries if each.framed}),
+            checks=sorted({each.received_as for each in entries if each.framed and not each.turned}),
+            turned=[each.constant for each in entries if each.turned and each.decoded],
         )
 
     def _kinds(self) -> tuple[str, ...]:

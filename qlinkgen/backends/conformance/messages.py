@@ -51,6 +51,7 @@ class Entry:
     Attributes:
         members: members of its struct, in the order of values in vectors.
         framed: its frame identifies the message.
+        turned: only its turn in a dialogue tells it.
         received_as: the direction in which it is received.
         received: whether it has a stream, which may be ``noisy``.
         lines: its rows.
@@ -74,6 +75,7 @@ class Entry:
     encoded: bool
     decoded: bool
     framed: bool
+    turned: bool
     received_as: str
     received: bool
     noisy: bool
@@ -194,6 +196,7 @@ class Entries:
             encoded=plan.encoded,
             decoded=plan.decoded,
             framed=framed,
+            turned=plan.turned,
             received_as=self._plan.direction_of(plan),
             received=found is not None,
             noisy=found is not None and found.noisy,

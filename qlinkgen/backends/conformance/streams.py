@@ -40,7 +40,7 @@ class Stream:
 def noise(plan: Plan) -> tuple[bytes, ...]:
     """Noise between frames: bytes that do not begin a frame, or begin one without completing it."""
     strategy, direction = plan.frame.receiver, plan.received_directions[0]
-    envelopes = [each.envelope for each in plan.frames[direction].every]
+    envelopes = [each.envelope for each in plan.frames[direction].sought]
     match strategy:
         case Hunt() | Rescan():
             # One byte more must not complete a frame.
@@ -68,7 +68,8 @@ def stream(plan: Plan, message: MessagePlan, rows: Sequence[Row]) -> Stream | No
     If only an id distinguishes frames from noise, noise can become part of a frame. Returns None for a
     message that is not received, or if not even consecutive frames are received as sent.
     """
-    if not message.decoded or message.asked or (plan.frame.needs_request and message.direction == "response"):
+    unframed = message.asked or message.turned
+    if not message.decoded or unframed or (plan.frame.needs_request and message.direction == "response"):
         return None
     for noisy, everything in ((True, True), (False, True), (False, False)):
         found = _heard(plan, plan.direction_of(message), rows, noisy=noisy, everything=everything)

@@ -42,7 +42,7 @@ _SUPPORT = {
     "_fasked": "Asked Told",
     "_frecords": "Record",
     "_ftexts": "BetweenField Letters Separated TextNumber Word",
-    "_kinds": "Kind Kinds",
+    "_kinds": "Kind Kinds Turned",
     "_fended": "EndedKind",
     "_ftrimmed": "Trimmed",
     "_fwalks": "TerminatedText Walked",

@@ -89,3 +89,11 @@ class Kinds(Frame):
             if kind.begins(wire):
                 return kind._frame(wire, request)
         raise FrameError("frame", f"no kind of frame begins with {wire[:1].hex()}")
+
+
+class Turned(Frame):
+    """Messages that only their turn in a dialogue tells: the frame of each is its payload."""
+
+    def __init__(self, *messages: Message) -> None:
+        Construct.__init__(self)
+        self.by_name = {each.name: each for each in messages}

@@ -73,7 +73,7 @@ def definitions(plan: Plan) -> tuple[Definition, ...]:
 
 
 def _definitions(plan: Plan) -> Iterator[Definition]:
-    layouts = [_kind_layout(each) for each in plan.frame.kinds]
+    layouts = [_kind_layout(each) for each in plan.frame.kinds if not each.turned]
     names = Names((*_OWN_NAMES, *layouts))
     stated = plan.protocol
     labelled = [each.name for each in stated.enums] + [each.name for each in stated.flags]
@@ -178,7 +178,9 @@ def _frames(plan: Plan, messages: Mapping[str, str], types: Types) -> Iterator[D
         if direction == "response" and plan.carrier is not None:
             made = Call("Told", (made, *frames[:-1], *_asked(plan, messages)))
         yield Definition(name, made)
-    yield Definition("MESSAGES", Call("messages_of", tuple(frames)), "Payloads by full name.")
+    told = Call("Turned", tuple(Ref(messages[each.name]) for each in plan.turned))
+    every: list[Node] = [*frames, *([told] if plan.turned else [])]
+    yield Definition("MESSAGES", Call("messages_of", tuple(every)), "Payloads by full name.")
 
 
 def _asked(plan: Plan, messages: Mapping[str, str]) -> Iterator[Node]:
@@ -189,7 +191,7 @@ def _asked(plan: Plan, messages: Mapping[str, str]) -> Iterator[Node]:
 
 def _layouts(plan: Plan, types: Types, algorithms: Algorithms) -> Iterator[Definition]:
     """The parts of frames, of each kind or direction that has its own."""
-    named = {_kind_layout(kind): kind for kind in plan.frame.kinds}
+    named = {_kind_layout(kind): kind for kind in plan.frame.kinds if not kind.turned}
     if not named and not plan.frame.needs_request:
         named = {_layout_name(way): each.frame for way, each in plan.ways.items()}
     for name, frame in named.items():
@@ -208,7 +210,7 @@ def _kind_layout(kind: FramePlan) -> str:
 def _kinds(plan: Plan, direction: Direction, messages: Mapping[str, str]) -> Call:
     """The kinds of frame of a direction, the shortest first."""
     calls: list[Node] = []
-    for kind in sorted(plan.frames[direction].kinds, key=lambda each: each.max_payload):
+    for kind in sorted(plan.frames[direction].sought, key=lambda each: each.max_payload):
         carried = [each for each in plan.received(direction) if kind in each.frames]
         chosen = Sequence(tuple(Ref(messages[each.name]) for each in carried))
         settings: dict[str, Node] = {"base": hexadecimal(kind.base)} if kind.base else {}

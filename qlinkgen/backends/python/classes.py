@@ -23,7 +23,7 @@ from qlinkgen.model.frame import ATTRIBUTE
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import pascal
 from qlinkgen.model.types import Scalar
-from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator
+from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator, ByTurn
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import Seed
 from qlinkgen.plan.payload import (
@@ -248,6 +248,7 @@ class ClassBuilder:
             *([] if addressed else ['ADDRESS = ""']),
             *(listing("PARTS = (", [f'"{name}"' for name in names], ")", 4) if names else []),
             *(f"COUNTER = {fact}" for fact in counted),
+            *([f"TURN = {self._plan.turn_of(message)}"] if message.turned else []),
         ]
 
     # Parts of a class
@@ -336,7 +337,7 @@ def _measured(message: MessagePlan) -> bool:
     """Whether only its counts determine the end of a message."""
     end = message.frames[-1].end
     match end:
-        case ByMessage():
+        case ByMessage() | ByTurn():
             return True
         case ByLength() | ByMark() | ByTerminator() | BySilence() | ByKind():
             return False

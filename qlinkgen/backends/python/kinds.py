@@ -72,6 +72,7 @@ class KindView:
         most: maximum size of it.
         lead: the constant that it begins with, b"" if that is the message id.
         begun: the message ids that it begins with, and the beginnings of these.
+        turned: only its turn in a dialogue tells it, so decoders of frames do not know it.
     """
 
     name: str
@@ -99,6 +100,7 @@ class KindView:
     most: int
     lead: str
     begun: Sequence[str]
+    turned: bool
 
 
 @dataclass(frozen=True)
@@ -164,6 +166,11 @@ class KindsView:
         return any(each.ended and each.ended.coding for each in self.kinds)
 
     @property
+    def has_turns(self) -> bool:
+        """Whether only its turn tells some frames."""
+        return any(each.turned for each in self.kinds)
+
+    @property
     def parted(self) -> bool:
         """Whether the directions have different kinds."""
         return "" not in self.by_first
@@ -192,9 +199,7 @@ def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
             literal(bytes((first,)))
             for first in dict.fromkeys(first for rows in by_first.values() for first, _ in rows)
         ],
-        found=[
-            views[each.name] for each in plan.frame.kinds if any(each in kinds for kinds in searched.values())
-        ],
+        found=[views[each.name] for each in plan.frame.sought if any(each in s for s in searched.values())],
         by_first={way: [(in_hex(first), kinds) for first, kinds in rows] for way, rows in by_first.items()},
         families=[(in_hex(base), kinds) for base, kinds in families.items()],
         measured=any(not view.size and view.ended is None for view in views.values()),
@@ -258,6 +263,7 @@ def _kind(frame: FramePlan, plan: Plan, make: Maker) -> KindView:
         overhead=envelope.overhead,
         head_tests=list(_head_tests(envelope, frame.name)),
         begun=list(_begun(envelope)),
+        turned=frame.turned,
         size=_size(frame, envelope),
         tail_tests=[test for part in envelope.back for test in pieces.tail_tests(envelope, part)],
         number_in_head=base + _grouped(pieces.number(envelope, envelope.id, "head"), base),
@@ -442,6 +448,6 @@ def _head_tests(envelope: Envelope, name: str) -> Iterator[tuple[str, str]]:
 
 def _begun(envelope: Envelope) -> Iterator[str]:
     """The message ids that frames begin with, as far as received; none if a constant begins them."""
-    if not envelope.preamble:
+    if not envelope.preamble and envelope.starts:
         sizes = range(1, len(envelope.starts[0]) + 1)
         yield from map(literal, sorted({start[:size] for start in envelope.starts for size in sizes}))

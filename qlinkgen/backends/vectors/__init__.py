@@ -65,8 +65,7 @@ class _Vectors:
         return [each for each in of_message if each.decode_only == decode_only]
 
     def _example(self, message: MessagePlan, example: Example) -> Good:
-        direction = self._codec.plan.direction_of(message)
-        found = self._codec.decode(example.wire, direction, example.after)
+        found = self._codec.decode_as(message, example.wire, example.after)
         payload = pack(message.payload, found.values)
         values, beside = dict(found.values), dict(found.beside)
         return Good(message, found.address, values, beside, payload, example.wire, example.after)

@@ -135,7 +135,7 @@ class Faults:
 
 def _judged(codec: Codec, good: Good, wire: bytes) -> str:
     try:
-        codec.decode(wire, codec.plan.direction_of(good.message), good.request)
+        codec.decode_as(good.message, wire, good.request)
     except BadFrame as bad:
         return bad.kind
     return ""

@@ -102,6 +102,7 @@ class _Maker:
         if several:
             document |= self._kinds(several, maker, document["bus"])
             kinds.lead_with_ids(random.Random(f"ids {self.seed}"), several)
+            self._dialogue_by_turn(several, maker, document["commands"])
         else:
             document |= self._traffic(shape, maker, document["bus"])
         parties = shape.master is not None
@@ -178,6 +179,37 @@ class _Maker:
                 own = {"frame": family.name, **self._identified(family.shape), "fields": fields}
                 steps.append({key: own})
         fit[0]["steps"] = [*steps, {"receive": "response"}]
+
+    def _dialogue_by_turn(self, several: Kinds, maker: FieldMaker, commands: Doc) -> None:
+        """Let only their turn tell some frames of a dialogue."""
+        # Drawn from another source: the schemas of earlier seeds stay what they are.
+        rng = random.Random(f"turn {self.seed}")
+        fit = [each for each in commands.values() if self._may_have_steps(each) and "separator" not in each]
+        fit = [each for each in fit if not isinstance(each["response"], str)]
+        command = next((each for each in fit if "steps" in each), fit[0] if fit else None)
+        if command is None or several.families[0].shape.bus != "master_slave" or rng.random() < 0.1:
+            return
+        name, most = "raw", rng.choice((40, 60, 280))
+        shape = Shape("kinds", {"parts": {}}, 1, most, 0, several.families[0].shape.bus, has_length=False)
+        makes = replace(maker, rng=rng, shape=shape, words=Words(rng, self.hostile))
+        steps = command.setdefault("steps", [{"receive": "response"}])
+        for key in rng.choices(("send", "receive"), k=rng.randint(1, 3)):
+            if key == "receive" or not several.addressed:
+                fields = makes.fields(Room.of(shape)) or {"data": "u16"}
+                limit = {"within": "1 s"} if key == "send" else {}
+                step = {key: {"frame": name, "fields": fields}, **limit}
+                steps.insert(rng.randrange(len(steps)), step)
+        if not several.addressed and rng.random() < 0.4:
+            number = rng.choice(({"range": "1..16"}, {"range": "1..16", "offset": 1}, {"range": "2..20"}))
+            last = f"{rng.choice(('bytes', 'u16', 'text', 'u8'))}[amount.count]"
+            around = rng.choice(({}, {"mark": "u8"}))
+            asked = {"frame": name, "fields": {"count": {"type": "u8", **number}}}
+            told = {"frame": name, "fields": {**around, "data": last}}
+            del steps[-1], command["response"]
+            steps += [{"name": "amount", "send": asked, "within": "1 s"}, {"receive": told}]
+        given = [each for step in steps for each in step.values() if isinstance(each, dict)]
+        if any(each.get("frame") == name for each in given):
+            several.frames[name] = {"parts": {"data": {"role": "payload", "size": f"1..{most}"}}}
 
     def _bus(self, shape: Shape) -> Doc:
         rng = self.rng

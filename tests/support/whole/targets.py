@@ -12,7 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from construct import ConstructError
+from construct import ConstructError, RangeError
 
 from qlinkgen.backends import construct
 from qlinkgen.backends.base import Outputs
@@ -259,10 +259,18 @@ class PythonTarget(Target):
 
     def decode(self, message: Message, wire: bytes, request: bytes) -> Seen:
         """See Target."""
+        if message.turned:
+            return self._turned(message, wire)
         direction = self.reference.direction_of(message)
         function = getattr(self.module, "decode" if direction == "message" else f"decode_{direction}")
         try:
             return self._seen(function(wire, *self._context(request)))
+        except self.module.DecodeError as error:
+            raise Wrong(error.kind, str(error)) from None
+
+    def _turned(self, message: Message, wire: bytes) -> Seen:
+        try:
+            return self._seen(self.module.MESSAGES[message.name].from_bytes(wire))
         except self.module.DecodeError as error:
             raise Wrong(error.kind, str(error)) from None
 
@@ -317,12 +325,9 @@ class InterpreterTarget(Target):
     def decode(self, message: Message, wire: bytes, request: bytes) -> Seen:
         """See Target."""
         try:
-            return self._seen(self._codec.decode(wire, self._direction(message), request))
+            return self._seen(self._codec.decode_as(self._plan.message(message.name), wire, request))
         except BadFrame as error:
             raise Wrong(error.kind, str(error)) from None
-
-    def _direction(self, message: Message) -> Direction:
-        return self._plan.direction_of(self._plan.message(message.name))
 
     def _seen(self, decoded: Decoded) -> Seen:
         found = decoded.values
@@ -365,6 +370,8 @@ class ConstructTarget(Target):
         if self.reference.address_name:
             whole[naming.record_key(self.reference.address_name)] = address
         try:
+            if message.turned:
+                return (self._live.payload(message.name, natives),) * 2
             frame = self._live.frames[self.reference.direction_of(message)]
             return self._live.payload(message.name, natives), frame.build(whole, request=request)
         except ConstructError as error:
@@ -372,6 +379,8 @@ class ConstructTarget(Target):
 
     def decode(self, message: Message, wire: bytes, request: bytes) -> Seen:
         """See Target."""
+        if message.turned:
+            return self._turned(message, wire)
         try:
             found = self._live.parse(self.reference.direction_of(message), wire, request)
         except ConstructError as error:
@@ -381,6 +390,15 @@ class ConstructTarget(Target):
         values = self.raws(message, lambda each: fields[each])
         name = self.reference.address_name
         return Seen(found["message"], found.get(naming.record_key(name)) if name else None, values)
+
+    def _turned(self, message: Message, wire: bytes) -> Seen:
+        try:
+            fields = self._live.messages[message.name].parse(wire)
+        except RangeError as error:
+            raise Wrong("length", str(error)) from None
+        except ConstructError as error:
+            raise Wrong(getattr(error, "kind", "range"), str(error)) from None
+        return Seen(message.name, None, self.raws(message, lambda each: fields[each]))
 
 
 def printed_structures(outputs: Outputs, folder: Path) -> construct.Live:

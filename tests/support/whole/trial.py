@@ -300,8 +300,7 @@ class _Trial:
     def _decoded(self, message: Message, wire: bytes, request: bytes) -> None:
         self.outcome.frames += 1
         try:
-            direction = self.reference.direction_of(message)
-            expected: Seen | Wrong = self.reference.decode(direction, wire, request)
+            expected: Seen | Wrong = self.reference.decode_as(message, wire, request)
         except Wrong as wrong:
             expected = wrong
         asked = self.reference.by_name[expected.name] if isinstance(expected, Seen) else message

@@ -118,7 +118,7 @@ class Reference:
         hidden = self.asked.names if self.asked is not None else ()
         sent = [each for each in self.messages if each.direction in (direction, "message")]
         if isinstance(self.frame, Kinds):
-            return dict(enumerate(sent))
+            return dict(enumerate(each for each in sent if not each.turned))
         return {each.number: each for each in sent if each.name not in hidden}
 
     def asking(self, message: Message) -> Mapping[str, Sequence[Message]]:
@@ -162,6 +162,12 @@ class Reference:
         if isinstance(frame, Marked):
             return frame.wrap(message, payload, address)
         return frame.wrap(message, payload, request)
+
+    def decode_as(self, message: Message, wire: bytes, request: bytes = b"") -> Seen:
+        """Decode the frame of a message, which may be told by its turn alone. Raises Wrong."""
+        if message.turned:
+            return Seen(message.name, None, values.decode(message, wire))
+        return self.decode(self.direction_of(message), wire, request)
 
     def decode(self, direction: Direction, wire: bytes, request: bytes = b"") -> Seen:
         """Decode exactly one frame. Raises Wrong."""

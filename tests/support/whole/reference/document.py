@@ -204,7 +204,8 @@ def _sized_by(spec: Any, frame: str, asked: Mapping[str, Number]) -> Any:
     if not (match := re.search(rf"\[{frame}\.(\w+)\]", text)):
         return spec
     number = asked[match[1]]
-    text = text.replace(match[0], f"[{number.low}..{number.high}]")
+    low, high = (int(number.native(end)) for end in (number.low, number.high))
+    text = text.replace(match[0], f"[{low}..{high}]")
     return {**spec, "type": text} if isinstance(spec, dict) else text
 
 

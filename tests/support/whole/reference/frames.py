@@ -234,6 +234,8 @@ class Frame:
         #: Bytes of one step of the length.
         self.step = length.spec.get("scale", 1) if length else 1
         first = self.parts[0]
+        #: A frame is its payload, and receivers do not look for it.
+        self.turned = len(self.parts) == 1
         #: What a frame begins with: a constant, or each id that a kind has; () for others.
         self.starts: tuple[bytes, ...] = (first.constant,) if first.role == "constant" else ()
         #: No leading constant: a candidate begins with a known message and a legal address.

@@ -45,7 +45,7 @@ class Kinds:
                 del frames[name]
         for way, frames in self.ways.items():
             for name, frame in frames.items():
-                if not frame.starts:
+                if not frame.starts and not frame.turned:
                     ways = (
                         (way,) if frame.one_way or "if" in data["frames"][name] else (*self.ways, "message")
                     )
@@ -57,7 +57,8 @@ class Kinds:
         """All messages, in order."""
         for message in self._messages():
             bounded = replace(message, limit=self._fields(message.frames).most)
-            yield document.with_separator(bounded, self._document(message.frames))
+            turned = self.frames[message.frames[0]].turned
+            yield replace(document.with_separator(bounded, self._document(message.frames)), turned=turned)
 
     def _messages(self) -> Iterator[Message]:
         data, defaults = self._data, self._data.get("defaults", {})
@@ -163,6 +164,9 @@ def _values_of(node: Any, key: str) -> Iterator[Any]:
                 yield each
             if name not in ("fields", "request", "frames", "types"):
                 yield from _values_of(each, key)
+    elif isinstance(node, list):
+        for each in node:
+            yield from _values_of(each, key)
 
 
 class KindSearcher(Receiver):

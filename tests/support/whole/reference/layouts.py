@@ -362,6 +362,8 @@ class Message:
     #: It precedes the first text too.
     leading: bool = False
     barred: bytes = b""
+    #: Only its turn tells it: its frame is its payload.
+    turned: bool = False
     #: Kinds of frame that carry it, if there are several.
     frames: tuple[str, ...] = ()
     #: Maximum size of a payload in the frame.
