@@ -54,6 +54,8 @@ class Message:
     default_address: int = 0
     #: Values of the frame that an answer repeats.
     echoed: tuple[str, ...] = ()
+    #: Values of its frame that are the same in each of its frames, and their numbers.
+    settled: tuple[tuple[str, int], ...] = ()
     #: Bytes of attributes that check values cover, by their names in ``over``.
     seeds: tuple[tuple[str, bytes], ...] = ()
     #: It carries the answers with its number, which only their request tells apart.

@@ -72,7 +72,7 @@ def _message(
 ) -> MessagePlan:
     frame = frames[-1]
     payload = payload_plan(message, frame.envelope.payload.trim)
-    envelope = frame.with_check(checked=message.checksum)
+    envelope = frame.with_check(checked=message.checksum).fixing(dict(message.settled))
     size = envelope.overhead + payload.most
     if len(frames) > 1:
         # A payload of the greatest size need not be in the longest frame.

@@ -18,6 +18,7 @@ from qlinkgen.plan.parts import (
     CheckPart,
     ConstantPart,
     ConstantSlot,
+    EqualPart,
     IdPart,
     IdSlot,
     LengthPart,
@@ -42,6 +43,14 @@ class Envelope:
     parts: tuple[Part, ...]
     before: Conditional | None = None
     after: Conditional | None = None
+
+    def fixing(self, numbers: Mapping[str, int]) -> Envelope:
+        """The frame where values are always the same, by name."""
+        if not numbers:
+            return self
+        cells = {id(part): part.fixing(numbers) for part in self.parts if isinstance(part, CellPart)}
+        # What is derived from a part still refers to the same one.
+        return replace(self, parts=tuple(_fixing(part, cells) for part in self.parts))
 
     @property
     def conditional(self) -> tuple[Conditional, ...]:
@@ -244,6 +253,17 @@ class Envelope:
     def seeded(self) -> tuple[CheckPart, ...]:
         """Check values that cover a seed, so that they can be verified only if the message is known."""
         return tuple(part for part in self.checks if self.seeds(part))
+
+
+def _fixing(part: Part, cells: Mapping[int, CellPart]) -> Part:
+    """A part among those in which values are always the same, by the identity of the original."""
+    match part:
+        case CellPart():
+            return cells[id(part)]
+        case EqualPart(of=CellPart() as of):
+            return replace(part, of=cells[id(of)])
+        case _:
+            return part
 
 
 def _bits_of(part: Part, whole: type[Part], slot: type[Slot]) -> Iterator[Bits]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from qlinkgen.model.integer import Chunk, Integer
+from qlinkgen.model.types import Settable
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.payload import Member
 
@@ -233,6 +234,14 @@ class ConstantSlot:
 Slot = IdSlot | AddressSlot | ConstantSlot | Member
 
 
+def _fixed(slot: Slot, numbers: Mapping[str, int]) -> Slot:
+    if not isinstance(slot, Member) or slot.name not in numbers:
+        return slot
+    value = numbers[slot.name]
+    number = replace(slot.number, minimum=value, maximum=value, default=value, role=Settable())
+    return replace(slot, number=number)
+
+
 @dataclass(frozen=True, slots=True)
 class CellPart(_IntegerPart):
     """An integer whose bits have several roles; bits without one are sent as 0 and ignored when received."""
@@ -248,6 +257,12 @@ class CellPart(_IntegerPart):
     def values(self) -> tuple[Member, ...]:
         """The values among its bits."""
         return tuple(slot for slot in self.slots if isinstance(slot, Member))
+
+    def fixing(self, numbers: Mapping[str, int]) -> CellPart:
+        """The part where some of its values are always the same."""
+        if numbers.keys().isdisjoint(each.name for each in self.values):
+            return self
+        return replace(self, slots=tuple(_fixed(each, numbers) for each in self.slots))
 
     @property
     def initial(self) -> int:

@@ -88,7 +88,8 @@ class MessagePlan:
 
     def envelope_in(self, frame: FramePlan) -> Envelope:
         """The parts of its frame of a kind."""
-        return self.envelope if frame is self.frames[-1] else frame.envelope
+        own = self.message.settled
+        return self.envelope if frame is self.frames[-1] else frame.envelope.fixing(dict(own))
 
     @property
     def turned(self) -> bool:

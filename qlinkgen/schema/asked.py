@@ -49,6 +49,12 @@ class AskedBuilder:
     def carrier(self, answers: Sequence[Message], path: Path) -> Message:
         """The message that a receiver takes for all of them, stated at a path."""
         self._check(answers, path)
+        for each in answers:
+            if each.settled:
+                what = (
+                    f"{each.name} has a fixed {each.settled[0][0]}, but only the request tells it from others"
+                )
+                self._report.error("bad-fixed", path, what, "let the program set it", needs=(path, _FRAME))
         first = answers[0]
         least = min(0 if each.empty_is_default else each.min_size for each in answers)
         most = max(each.max_size for each in answers)

@@ -125,6 +125,7 @@ class MessageBuilder:
             confirmed=spec.confirmed,
             empty_is_default=direction == "request" and spec.empty_request == "defaults",
             echoed=self._echoed(direction),
+            settled=self._settled(layout, direction),
             checksum=self._has_checksum(name),
             addresses=ranges,
             default_address=default,
@@ -163,6 +164,7 @@ class MessageBuilder:
             section=spec.section,
             confirmed=spec.confirmed,
             echoed=self._echoed(direction),
+            settled=self._settled(layout, direction),
             checksum=self._has_checksum(command or name),
             addresses=ranges,
             default_address=default,
@@ -207,6 +209,10 @@ class MessageBuilder:
             return self._base + next(self._turned)
         return self._base + self._ids.number(stated, direction, path, whose, way=layout.way)
 
+    def _settled(self, layout: Written, direction: Direction) -> tuple[tuple[str, int], ...]:
+        """Values of its frame that a message fixes."""
+        return () if layout.inherited else self._ids.fixed(layout.number, direction, layout.number_path)
+
     def _added(self, message: Message, layout: Written) -> Message:
         if any(field.walked for field in message.fields):
             message = replace(message, limit=self._limits()[1])
@@ -233,6 +239,7 @@ class MessageBuilder:
             doc=spec.doc,
             section=spec.section,
             confirmed=spec.confirmed,
+            settled=self._settled(layout, direction),
             checksum=self._has_checksum(name),
             addresses=(nodes,) if nodes else (),
             default_address=nodes[0] if nodes else 0,

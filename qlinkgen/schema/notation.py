@@ -201,10 +201,14 @@ Given = int | str | Mapping[str, int | str] | None
 
 @dataclass(frozen=True, slots=True)
 class StatedId:
-    """The number of a message as written, and what is added to it."""
+    """The number of a message as written, and what is added to it.
+
+    It is ``own`` unless it is that of the request.
+    """
 
     given: Given
     added: int = 0
+    own: bool = True
 
 
 #: The id of a message in a frame without one.
@@ -222,7 +226,7 @@ class AnswerId:
         """The number of the answer to a request, which may not fit the frame."""
         if self.relative:
             assert isinstance(self.number, int)
-            return StatedId(request, self.number)
+            return StatedId(request, self.number, own=False)
         return StatedId(self.number)
 
 

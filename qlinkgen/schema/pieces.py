@@ -6,9 +6,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 
+from qlinkgen.model.fields import FieldType
 from qlinkgen.model.frame import Counting, DelimitedFrame, Frame, Part, PartBits
 from qlinkgen.model.message import Direction
-from qlinkgen.model.types import Bits, Blob, Float, Scalar, byte_chunks
+from qlinkgen.model.types import Bits, Blob, Characters, Flags, Float, Scalar, byte_chunks
 from qlinkgen.schema.file_fields import FieldSpec
 from qlinkgen.schema.file_frames import PartBitSpec, PartSpec
 from qlinkgen.schema.notation import NO_ID, StatedId, shown
@@ -216,6 +217,7 @@ class IdBuilder:
         self.direction = next((each for each in pieces if each.role == "direction"), None)
         self._pieces = [each for each in pieces if each.role == "message"]
         by_parts = isinstance(frame, DelimitedFrame) and frame.directed
+        self._values = {each.name for each in frame.values} if isinstance(frame, DelimitedFrame) else set()
         self._directed = by_parts or self.direction is not None
 
     @property
@@ -262,9 +264,25 @@ class IdBuilder:
             given = {names[0]: given}
         return self._added(self._composed(given, names, path), stated.added, path, whose)
 
+    def fixed(self, stated: StatedId, direction: Direction, path: Path) -> tuple[tuple[str, int], ...]:
+        """The values of the frame that an id states beside the pieces of the number, and their numbers."""
+        frame, given = self._frame, stated.given
+        if not isinstance(frame, DelimitedFrame) or not isinstance(given, Mapping) or not stated.own:
+            return ()
+        known = {each.name: each.type for each in frame.towards(direction).values}
+        found = []
+        for name, number in given.items():
+            if name not in self._values:
+                continue
+            if fault := _fixed_fault(name, number, known.get(name), frame):
+                self._report.error("bad-fixed", (*path, name), *fault, needs=(path, ("frame",)))
+            elif isinstance(number, int):
+                found.append((name, number))
+        return tuple(found)
+
     def _composed(self, stated: Mapping[str, int | str], names: list[str], path: Path) -> int:
-        if set(stated) != set(names):
-            hint = f"give {listed(names)}, and nothing else"
+        if set(stated) - self._values != set(names):
+            hint = f"give {listed(names)}, and values of every frame"
             self._wrong(path, f"the id consists of {listed(names)}", hint)
             return 0
         given = {piece.name: self._piece(piece, stated[piece.name], path) for piece in self._pieces}
@@ -319,3 +337,21 @@ class IdBuilder:
 
     def _wrong(self, path: Path, what: str, hint: str, rule: str = "bad-frame") -> None:
         self._report.error(rule, path, what, hint, needs=(path, ("frame",)))
+
+
+def _fixed_fault(
+    name: str, number: int | str, kind: FieldType | None, frame: DelimitedFrame
+) -> tuple[str, str] | None:
+    """Error and fix for a value that a message fixes, None if it is right."""
+    held = next((bits for part in frame.parts for bits in part.bits if bits.name == name), None)
+    if kind is None:
+        return f"the frame of the message does not have {name}", "remove it"
+    if held is not None and (held.counting or held.party):
+        return f"{name} is not a value that the program chooses", "remove it"
+    if any(part.when and part.name == name for part in frame.parts) or not isinstance(kind, Scalar):
+        return f"not every frame has {name}", "fix the value that decides whether it is there"
+    if kind.scaling is not None or isinstance(kind.meaning, Float | Characters | Flags):
+        return f"{name} is not a whole number", "remove it; the program sets it"
+    if not isinstance(number, int) or not kind.minimum <= number <= kind.maximum:
+        return f"{name} cannot be {number}", f"use {kind.minimum}..{kind.maximum}"
+    return None

@@ -388,6 +388,11 @@ _ALL = (
         "Both sides follow the same list, without loops or choices, and one request goes to one node.",
     ),
     Rule(
+        "bad-fixed",
+        "Beside the pieces of a message id, id states values of every frame that are always the same.",
+        "An encoder refuses another value, and a receiver takes no frame with another one for the message.",
+    ),
+    Rule(
         "bad-echo",
         "A field of an answer repeats a field of its request, or a part of its frame, that it can hold.",
         "It identifies the request that a response belongs to.",

@@ -85,6 +85,9 @@ class UnknownBuilder:
         return True
 
     def _holds(self, message: Message, name: str) -> bool:
+        if message.settled:
+            what = f"{message.name} has a fixed {message.settled[0][0]}"
+            self._error((*_PATH, name), what, "name a reply without one")
         if message.echoes:
             what = f"{message.echoes[0]} repeats the request, which is not known"
             self._error((*_PATH, name), what, "name a reply without an echo")

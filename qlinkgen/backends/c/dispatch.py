@@ -9,6 +9,7 @@ from typing import NamedTuple
 from qlinkgen.backends.c.echoes import of_reply, of_response
 from qlinkgen.backends.c.framing import Address, Expected, Function, expected
 from qlinkgen.backends.c.names import Names, count_type, unsigned
+from qlinkgen.backends.c.settled import assigned, differing
 from qlinkgen.backends.c.several import Listed, listed_in
 from qlinkgen.model.fields import FieldType
 from qlinkgen.model.message import Message
@@ -16,6 +17,7 @@ from qlinkgen.model.naming import handler, member, snake
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Allowance, Bus, Command, Exchange, Repeat, Unknown
 from qlinkgen.model.types import Scalar
+from qlinkgen.plan.payload import Member
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -42,6 +44,7 @@ class SlaveEntry:
         unless_silent: term of a condition that prevents a response to a broadcast.
         replies: functions of other answers.
         initial: statements for the response, beyond its defaults, before the function is called.
+        settled: statements for the values of its frame that are always the same.
         turn: its number in a dialogue, 0 if it begins a transaction; ``following`` is that of the next frame.
         listed: the nodes in it, each of which sends an answer; None if it has no list.
         begins: the flag of its answers without an end, "" if they have one; ``stops`` are those that it ends.
@@ -62,6 +65,7 @@ class SlaveEntry:
     unless_silent: str
     replies: list[str]
     initial: list[str]
+    settled: list[str]
     turn: str
     following: str
     listed: Listed | None
@@ -85,8 +89,9 @@ class ReplyEntry:
     commands: list[str]
     function: str
     has_struct: bool
-    #: Statements for what it repeats of its request.
+    #: Statements for what it repeats of its request, and for values of its frame that are always the same.
     repeated: list[str]
+    settled: list[str]
 
     @property
     def needs_frame(self) -> bool:
@@ -169,12 +174,14 @@ def slave_entries(
     exchanges: Mapping[str, Exchange],
     *,
     address: str,
+    values: Mapping[str, Member],
     reject: str,
     streams: Sequence[Streaming] = (),
 ) -> list[SlaveEntry]:
     """Requests to a slave, in schema order.
 
     ``address`` is the member with the address and ``reject`` the function that rejects, "" without one.
+    ``values`` are those of frames.
     """
     present = {message.name for message in kept}
     entries = []
@@ -198,6 +205,7 @@ def slave_entries(
                     addressing if address else "",
                     reject,
                     address=address,
+                    values=values,
                     replies=replies,
                     exchange=exchange,
                     streaming=streams,
@@ -206,13 +214,11 @@ def slave_entries(
     return entries
 
 
-def reply_entries(
-    names: Names, protocol: Protocol, commands: tuple[Command, ...], kept: tuple[Message, ...], address: str
-) -> list[ReplyEntry]:
+def reply_entries(names: Names, plan: Plan, kept: tuple[Message, ...], address: str) -> list[ReplyEntry]:
     """The other answers of a slave, each once; ``address`` is the member with the address."""
     present = {message.name for message in kept}
     found: dict[str, tuple[Message, list[Command]]] = {}
-    for command in commands:
+    for command in plan.commands:
         for message in (reply.message for reply in command.replies):
             if message.name in present and command.request.name in present:
                 found.setdefault(message.name, (message, []))[1].append(command)
@@ -222,7 +228,8 @@ def reply_entries(
             [command.name for command in those],
             names.function(message),
             bool(message.values),
-            of_reply(those, message, protocol.frame, address),
+            of_reply(those, message, plan.protocol.frame, address),
+            assigned(message, plan.beside, "slave->parts."),
         )
         for name, (message, those) in found.items()
     ]
@@ -236,6 +243,7 @@ def _entry(
     reject: str,
     *,
     address: str,
+    values: Mapping[str, Member],
     replies: list[str],
     exchange: Exchange | None,
     streaming: Sequence[Streaming],
@@ -246,6 +254,10 @@ def _entry(
     target = "&request, " if message.values else ""
     decoded = f"{function}_decode({target}frame->payload, frame->size) == {names.upper}_OK"
     refuses = bool(reject and answer)
+    right = [
+        decoded if message.fields else "frame->size == 0U",
+        *(f"!({each})" for each in differing(message, values, "frame->parts.")),
+    ]
     return SlaveEntry(
         name=handler_name(names, message),
         constant=names.constant(message),
@@ -258,10 +270,11 @@ def _entry(
         own=addressing in {"node", "none"},
         broadcast_only=addressing == "broadcast",
         unsupported=f"{reject}({answer_constant}_MIN_SIZE, wire, capacity)" if refuses else "0",
-        right=decoded if message.fields else "frame->size == 0U",
+        right=" && ".join(f"({each})" for each in right) if len(right) > 1 else right[0],
         unless_silent=" && !slave->broadcast" if answer and addressing == "either" else "",
         replies=replies,
         initial=_initial(command, message, answer, address) if command and answer else [],
+        settled=assigned(answer, values, "slave->parts.") if answer else [],
         turn=turn_name(names, message) if exchange and exchange.turn else "",
         following=turn_name(names, following) if following else "",
         listed=_listed(exchange.command) if exchange and answer else None,

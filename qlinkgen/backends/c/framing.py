@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from qlinkgen.backends.c.checks import condition, refused_when_received
 from qlinkgen.backends.c.names import Names, storage, unsigned, unsigned_type
 from qlinkgen.backends.c.separated import constant_size
+from qlinkgen.backends.c.settled import differing
 from qlinkgen.backends.c.sizes import size_terms
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.naming import member
 from qlinkgen.plan.ends import ByMark
 from qlinkgen.plan.expr import OneOf
 from qlinkgen.plan.framing import FramePlan
-from qlinkgen.plan.payload import PayloadPlan
+from qlinkgen.plan.payload import Member, PayloadPlan
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -24,12 +26,14 @@ class Address:
     Attributes:
         values_type: type of the values of the frame, "" if there are none.
         refused: conditions that hold if a value of ``frame`` is out of range.
+        values: the values of frames by name.
     """
 
     name: str
     bits: int
     values_type: str = ""
     refused: tuple[str, ...] = ()
+    values: Mapping[str, Member] = field(default_factory=dict)
 
     @property
     def parameter(self) -> str:
@@ -113,12 +117,17 @@ def to_frame(frame: FramePlan, names: Names, own: str, address: Address, message
     """The function that encodes the whole frame of a message; ``own`` begins the names of what it calls."""
     stated = message.message
     struct = struct_parameter(names, stated, const=True)
+    wrong = [
+        line
+        for test in differing(stated, address.values, "parts->")
+        for line in (f"if ({test}) {{", f"    return {names.upper}_ERROR_RANGE;", "}")
+    ]
     lines, size = _payload_lines(names, own, message, bool(struct)) if stated.fields else ([], "0")
     group = address_group(message, address)
     wrap = f"{own}_wrap_{group.name}_" if group else f"{own}_wrap_"
     arguments = f"{names.constant(stated)}_ID, {address.argument}wire, capacity, {size}"
     lines.append(f"return {wrap}({arguments}{_checked(frame, message)});")
-    return Function(struct + address.parameter, lines)
+    return Function(struct + address.parameter, [*wrong, *lines])
 
 
 def _checked(frame: FramePlan, message: MessagePlan) -> str:
@@ -183,6 +192,7 @@ def is_wide(message: MessagePlan) -> bool:
 
 def expected(names: Names, address: Address, message: MessagePlan) -> Expected:
     """The conditions on a received frame of a message."""
+    refused = [*address.refused, *differing(message.message, address.values, "frame->parts.")]
     return Expected(
         constant=names.constant(message.message),
         function=names.function(message.message),
@@ -190,7 +200,7 @@ def expected(names: Names, address: Address, message: MessagePlan) -> Expected:
         has_bytes=bool(message.message.fields),
         allowed=_both(
             allowed(message.allowed, address.name and f"frame->{address.name}", address.bits),
-            f"!({condition(list(address.refused))})" if address.refused else "",
+            f"!({condition(refused)})" if refused else "",
         ),
         address_allowed=allowed(message.allowed, address.name, address.bits),
     )
@@ -211,4 +221,4 @@ def address_of(plan: Plan, name: str, direction: Direction = "response") -> Addr
     ]
     kind = f"{plan.protocol.name}_parts_t" if values else ""
     sizes = [bits.bits for each in frame.every for bits in each.envelope.address[:1]]
-    return Address(name, sizes[0] if sizes else 8, kind, tuple(refused))
+    return Address(name, sizes[0] if sizes else 8, kind, tuple(refused), values)

@@ -27,12 +27,12 @@ from qlinkgen.backends.c.sizes import SizeView, size_view, sized_by_message, tur
 from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.backends.c.types import Kind, Types
 from qlinkgen.backends.c.views import FrameView, own_prefix
-from qlinkgen.model.fields import Layout
+from qlinkgen.model.fields import Layout, Value
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.naming import snake
 from qlinkgen.model.types import Float
 from qlinkgen.plan import plan_of
-from qlinkgen.plan.payload import BytesStep, all_records
+from qlinkgen.plan.payload import BytesStep, Member, all_records
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 #: Templates about what the frames of all directions have in common.
@@ -161,9 +161,8 @@ class Header:
 
     def _beside(self) -> Beside | None:
         """The struct of the values of every frame, None without any."""
-        held = self._plan.beside
-        stated = self._protocol.frame_values
-        return self._writer.beside([(held[each.name], each) for each in stated]) if held else None
+        held = [(member, value) for _, member, value in self._held()]
+        return self._writer.beside(held) if held else None
 
     def _address_groups(self, way: str) -> list[framing.AddressGroup]:
         """Sets of legal addresses of the encoded messages of a direction, or of all."""
@@ -241,7 +240,19 @@ class Header:
             if message.encoded
             else None,
             from_frame=section.from_frame(names, message) if message.decoded else None,
+            parts_init=self._parts_init(message),
         )
+
+    def _parts_init(self, message: MessagePlan) -> str:
+        """The initialiser of the values of its frame, "" if no value is always the same."""
+        own = {each.name: each for _, each in message.envelope.values}
+        held = [(own.get(name, each), value) for name, each, value in self._held()]
+        return self._writer.beside(held).initialiser if message.message.settled else ""
+
+    def _held(self) -> list[tuple[str, Member, Value]]:
+        """The values of every frame, as planned and as stated."""
+        held = self._plan.beside
+        return [(each.name, held[each.name], each) for each in self._protocol.frame_values] if held else []
 
     def _checks(self) -> list[str]:
         checks = [
@@ -294,6 +305,7 @@ class Header:
             self._kept,
             self._protocol.exchanges,
             address=section.view.address,
+            values=self._plan.beside,
             reject=section.reject,
             streams=dispatch.streaming(self._names, self._plan.commands, self._kept),
         )
@@ -319,8 +331,7 @@ class Header:
         used = any(entry.replies for entry in slave)
         if not used:
             return []
-        commands, address = self._plan.commands, self._section.view.address
-        return dispatch.reply_entries(self._names, self._protocol, commands, self._kept, address)
+        return dispatch.reply_entries(self._names, self._plan, self._kept, self._section.view.address)
 
     def _head(self) -> HeadView:
         protocol, runs, check = self._protocol, self._byte_runs(), self._section.check

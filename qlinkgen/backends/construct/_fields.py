@@ -404,10 +404,13 @@ class Message(Construct):
         checksum: bool = True,
         empty_is_default: bool = False,
         seeds: Sequence[tuple[str, bytes]] = (),
+        settled: Sequence[tuple[str, int]] = (),
     ) -> None:
         super().__init__()
         self.name = name
         self.id = message_id
+        #: Values of its frame that are always the same.
+        self.settled = dict(settled)
         self.fields = fields
         self.addresses = addresses
         self.checksum = checksum

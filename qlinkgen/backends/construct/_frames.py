@@ -462,7 +462,8 @@ class Frame(Construct):
         return self._wrap(sending)
 
     def _wrap(self, sending: Sending) -> bytes:
-        message, payload, address, request, number, beside = sending
+        message, payload, address, request, number, given = sending
+        beside: Values = {**message.settled, **given}
         stuffing = self.stuffing
         shown = self._number(message) if number is None else number
         sent = stuffing.add(payload) if stuffing and not stuffing.over else payload
@@ -471,6 +472,12 @@ class Frame(Construct):
             if isinstance(part, Cell):
                 whole = part.number(shown, address, beside)
                 cells[part.name] = bytes(part.integer.build(whole))
+                if message.settled and part.values:
+                    seen = part.values.parse(cells[part.name])
+                    if name := _unsettled(message, seen):
+                        number = message.settled[name]
+                        text = f"{name} of {message.name} is always {number}"
+                        raise ValidationError(text)
             else:
                 cells[part.name] = self._cell(part, shown, sent, address, cells)
         cells = self._settled(cells) | message.seeds
@@ -647,6 +654,9 @@ class Frame(Construct):
                     place |= part.values.parse(cells[part.name])
                 except ConstructError as error:
                     raise FrameError("range", f"{part.name}; {error}") from None
+        if name := _unsettled(message, place):
+            text = f"{name} of {message.name} is not {message.settled[name]}"
+            raise FrameError("range", text)
         return Container(message=message.name, **place, fields=fields)
 
     def _compare_blocks(self, cells: Mapping[str, bytes], payload: bytes) -> None:
@@ -655,6 +665,16 @@ class Frame(Construct):
                 values = b"".join(blocks.values(payload))
                 if cells[blocks.name] != values:
                     raise FrameError("crc", f"{blocks.name} are not {values.hex()}")
+
+
+def _unsettled(message: Message, values: Values) -> str:
+    """The first value of a frame that is not as the message settles it."""
+    wrong = (
+        name
+        for name, number in message.settled.items()
+        if name in values and int(values[name]) != number
+    )
+    return next(wrong, "")
 
 
 def _parsed(message: Message, payload: bytes) -> Container:

@@ -106,6 +106,8 @@ def _message(message: MessagePlan, types: Types) -> Call:
         settings["keep"] = message.payload.trim
     if message.message.seeds:
         settings["seeds"] = message.message.seeds
+    if message.message.settled:
+        settings["settled"] = message.message.settled
     if message.payload.separator:
         settings |= _dividing(message.payload)
     elif message.payload.walked:

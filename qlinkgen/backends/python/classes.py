@@ -114,9 +114,8 @@ class ClassBuilder:
         if not message.frames:
             return self._place
         several = self._plan.frame.kinds
-        return self._place.within(
-            message.envelope if several else self._plan.frames[message.direction].envelope
-        )
+        whole = message.envelope if several else self._plan.frames[message.direction].envelope
+        return self._place.within(whole.fixing(dict(message.message.settled)))
 
     @property
     def scales(self) -> list[str]:
@@ -241,6 +240,7 @@ class ClassBuilder:
         base = message.frames[-1].base
         addressed = message.allowed is not None or not self._place.address
         names = [attribute(member.name) for _, member in message.envelope.values]
+        settled = [f'("{attribute(name)}", {number})' for name, number in message.message.settled]
         counter = self._plan.protocol.counter
         counted = [values.counter_fact(counter)] if counter and attribute(counter.name) in names else []
         return [
@@ -249,6 +249,7 @@ class ClassBuilder:
             *(listing("PARTS = (", [f'"{name}"' for name in names], ")", 4) if names else []),
             *(f"COUNTER = {fact}" for fact in counted),
             *([f"TURN = {self._plan.turn_of(message)}"] if message.turned else []),
+            *(listing("SETTLED = (", settled, ")", 4) if settled else []),
         ]
 
     # Parts of a class

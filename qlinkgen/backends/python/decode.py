@@ -42,6 +42,7 @@ from qlinkgen.plan.payload import (
     ItemsStep,
     Learn,
     Member,
+    PayloadPlan,
     RecordsStep,
     RecordStep,
     ReservedStep,
@@ -49,6 +50,7 @@ from qlinkgen.plan.payload import (
     Sizing,
     Step,
     ValueStep,
+    all_records,
     term_of,
     value_name,
 )
@@ -105,8 +107,14 @@ class Decoder:
         for part in self.place.front:
             self._part(part, at)
             at += part.size
+        header: list[str] = []
+        if _has_checks(
+            payload
+        ):  # a wrong check value is told before a value of the frame that is out of range
+            header, self._values = self._values, header
         for step in payload.steps:
             self._step(step)
+        self._values += header
         at = payload.size
         for part in self._needed_back():
             self._part(part, at)
@@ -780,3 +788,8 @@ def assigned_targets(targets: Sequence[str], call: str) -> list[str]:
     if _INDENT + len(line) <= WIDTH:
         return [line]
     return ["(", *(f"    {target}," for target in targets), f") = {call}"]
+
+
+def _has_checks(payload: PayloadPlan) -> bool:
+    """Whether a payload, or a record in it, has check values."""
+    return any(each.filled_in for each in (payload, *(one.payload for one in all_records((payload,)))))

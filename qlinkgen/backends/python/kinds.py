@@ -138,6 +138,7 @@ class KindsView:
         slots: the names of attributes of all messages.
         seeds: attributes of message classes that check values cover.
         counted: some kinds have a counter.
+        settled: some messages have values that are always the same.
         lasts: the last bytes of terminators.
     """
 
@@ -154,6 +155,7 @@ class KindsView:
     slots: Sequence[str]
     seeds: Sequence[str]
     counted: bool
+    settled: bool
     lasts: Sequence[str]
     check: CheckView | None
 
@@ -207,6 +209,7 @@ def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
         slots=sorted([*([address.name] if name else []), *map(attribute, plan.frame.values)], key=natural),
         seeds=sorted({seed_name(seed) for each in plan.frame.kinds for seed in _seeds(each)}),
         counted=plan.protocol.counter is not None,
+        settled=any(each.message.settled for each in plan.messages),
         lasts=list(dict.fromkeys(view.ended.last for view in views.values() if view.ended)),
         check=_selectable(list(views.values())),
         makers=frozenset(check.view.maker for view in views.values() for check in view.checks),

@@ -256,8 +256,11 @@ class Module:
                 used |= {"short_of"}
             case KindsView():
                 used |= {"wrong_check", *view.makers} if view.makers else set()
-                used |= {"illegal", "index", "refused"} if view.address else set()
-                used |= {"REFUSALS", "settled"} if view.values else set()
+                used |= {"illegal", "refused"} if view.address or view.settled else set()
+                used |= {
+                    *(["index"] if view.address else []),
+                    *(["REFUSALS", "settled"] if view.values else []),
+                }
         seeds = isinstance(view, PartsView) and view.seeds
         held = self.plan.directed and bool(self.plan.beside)
         if isinstance(view, UniqueView | PartsView) and not view.address and not seeds and not held:

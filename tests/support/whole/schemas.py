@@ -13,6 +13,7 @@ from tests.support.whole.fields import FieldMaker, Room
 from tests.support.whole.frames import Shape
 from tests.support.whole.kinds import Kinds
 from tests.support.whole.reference.notation import whole_span
+from tests.support.whole.settled import settle
 
 Doc = dict[str, Any]
 _PLAIN = re.compile(r"[a-z][a-z0-9_]*\Z", re.ASCII)
@@ -253,6 +254,7 @@ class _Maker:
         else:
             found |= self._several(shape, maker, bus, taken, kinds, attributes="attributes" in found)
         self._seeds(shape, found)
+        settle(rng, shape, found)
         return found
 
     def _several(

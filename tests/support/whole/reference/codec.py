@@ -70,6 +70,7 @@ class Reference:
         )
 
     def _read(self, data: Doc) -> None:
+        self.data = data
         shape = data["frame"]
         if "parts" in shape:
             self.frame, self.requests = Frame(data, "response"), Frame(data, "request")
@@ -111,7 +112,14 @@ class Reference:
             return message
         parts = (part for part in frame.parts if part.name in frame.tests and part.values)
         depending = [(name, frame.tests[part.name]) for part in parts for name, *_ in part.values]
-        return replace(message, beside=frame.beside, depending=tuple(depending))
+        stated = document.settled(self.data, message)
+        beside = tuple(
+            (name, replace(kind, low=stated[name], high=stated[name], default=stated[name]))
+            if name in stated
+            else (name, kind)
+            for name, kind in frame.beside
+        )
+        return replace(message, beside=beside, depending=tuple(depending))
 
     def known(self, direction: Direction) -> dict[int, Message]:
         """The messages of a direction by their number, of several kinds of frame by any."""

@@ -30,6 +30,28 @@ def numbered(document: Doc, given: Any, direction: str) -> int:
     return number
 
 
+def settled(document: Doc, message: Message) -> Mapping[str, int]:
+    """The values of its frame that a message states beside its id."""
+    command, _, part = message.name.partition(".")
+    spec: Doc = document.get("commands", {}).get(command, {})
+    replies = {**document.get("replies", {}), **spec.get("replies", {})}
+    given: Any = None
+    if part == "request":
+        given = spec.get("id")
+    elif part == "response":
+        defaults = document.get("defaults", {})
+        given = answer(spec.get("response"), defaults.get("response")).get("id")
+    elif part in replies or (not part and command in replies and not spec):
+        given = replies[part or command].get("id")
+    elif not part:
+        given = document.get("messages", {}).get(command, {}).get("id")
+    pieces = [
+        (name, each) for name, part in document["frame"].get("parts", {}).items() for each in bits_of(part)
+    ]
+    ids = {inner or name for name, (inner, role, *_) in pieces if role in ("message", "direction")}
+    return {name: each for name, each in given.items() if name not in ids} if isinstance(given, dict) else {}
+
+
 def seeds(document: Doc, message: str) -> Mapping[str, bytes]:
     """The bytes of the numeric attributes of a message."""
     name = message.partition(".")[0]

@@ -68,7 +68,11 @@ class Receiver:
             found = values.decode(message, payload())
             if address is not None and not message.allows(address):
                 raise Wrong("range")
-            found = {**beside(), **found}
+            around = beside()
+            for name, kind in message.beside:
+                if name in around:
+                    values.check(kind, int(str(around[name])))
+            found = {**around, **found}
         except Wrong as wrong:
             return Event(wrong.kind, self.at, offset, raw)
         return Event("message", self.at, offset, raw, message.name, address, found)
