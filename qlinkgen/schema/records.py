@@ -20,7 +20,7 @@ from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 
 #: Maximum number of records inside each other.
-_MAX_DEPTH = 2
+_MAX_DEPTH = 3
 #: Keys of a field that apply to a record.
 _KEYS = frozenset({"type", "echo", "if", "optional", "last", *Fact.model_fields, *Lifetime.model_fields})
 

@@ -207,7 +207,7 @@ _ALL = (
     ),
     Rule(
         "extent-depth",
-        "A record contains records without records in them.",
+        "Records are inside each other at most three levels deep.",
         "Firmware decodes them without recursion, level by level.",
     ),
     Rule(

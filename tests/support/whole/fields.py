@@ -14,6 +14,8 @@ from tests.support.whole.frames import Shape
 
 Doc = dict[str, Any]
 _INTEGERS = ("u8", "u8", "i8", "u16", "i16", "u24", "i24", "u32", "i32", "u40", "i48", "u56", "u64", "i64")
+#: Maximum number of records inside each other.
+_DEPTH = 3
 _SCALES = (("1/10", 10), ("1/2^8", 256), ("0.5", 2), ("5", 1), ("-1/4", 4), ("1/1000", 1000), ("1/3", 3))
 
 
@@ -108,10 +110,10 @@ class FieldMaker:
             self.named[name] = self._scalar()[0]
         for _ in range(rng.choice((0, 0, 1, 2))):
             self._new_bits()
-        for _ in range(rng.choice((0, 1, 2, 3))):
+        for _ in range(rng.choice((0, 1, 2, 3, 4))):
             self._new_record()
         if not (self.shape.word > 1 or self.shape.trimmed or self.shape.kind == "packet"):
-            for _ in range(rng.choice((0, 0, 1, 2))):
+            for _ in range(rng.choice((0, 0, 1, 2, 4))):
                 self._new_varied()
         records = {**self.bitty, **self.records, **self.varied}
         return {
@@ -139,7 +141,7 @@ class FieldMaker:
 
     def _new_record(self) -> None:
         """A record of fixed size, perhaps with records in it."""
-        inner, taken = [name for name, each in self.records.items() if each.depth == 1], set[str]()
+        inner, taken = [name for name, each in self.records.items() if each.depth < _DEPTH], set[str]()
         made: Doc = {}
         size, depth, has_value = 0, 1, False
         for _ in range(self.rng.choice((1, 2, 3, 5))):
@@ -153,8 +155,8 @@ class FieldMaker:
                 spec: Any = f"{kind}[{times}]"
                 more = self.bitty[kind].size * times
             elif inner and roll < 0.2:
-                kind = self.rng.choice(inner)
-                times, depth = self.rng.choice((0, 0, 1, 2, 3)), 2
+                kind = self.rng.choice((*inner, inner[-1]))  # some in three levels
+                times, depth = self.rng.choice((0, 0, 1, 2, 3)), max(depth, 1 + self.records[kind].depth)
                 spec = f"{kind}[{times}]" if times else kind
                 more = self.records[kind].size * max(1, times)
             elif roll < 0.35:
@@ -213,7 +215,7 @@ class FieldMaker:
             for each in made.values()
         )
         nested = any(self.is_varied(each) for each in made.values())
-        if depth <= 2 and size <= 60 and (varies or nested or last):
+        if depth <= _DEPTH and size <= 60 and (varies or nested or last):
             ended = "'terminator'" in repr(made) or any(
                 self.varied[name].ended for name in self.varied if f"'{name}" in repr(made)
             )
@@ -223,11 +225,11 @@ class FieldMaker:
     def _rest_part(self, made: Doc, taken: set[str], test: str) -> tuple[int, int]:
         """What takes all bytes that are left in some records: its size, and the records inside each other."""
         rng, name = self.rng, self.words.name(taken)
-        inner = [kind for kind, each in self.varied.items() if each.rests and each.depth == 1]
+        inner = [kind for kind, each in self.varied.items() if each.rests and each.depth < _DEPTH]
         if inner and rng.random() < 0.5:
             kind = rng.choice(inner)
             made[name] = rng.choice((kind, {"type": kind, "if": test}))
-            return self.varied[kind].size, 1
+            return self.varied[kind].size, self.varied[kind].depth
         most, kind = rng.choice((1, 4, 9)), "text" if self.shape.groups else rng.choice(("bytes", "u16"))
         made[name] = {"type": f"{kind}[{rng.choice((0, 0, 1))}..{most}]", "if": test}
         if rng.random() < 0.3:
@@ -237,7 +239,7 @@ class FieldMaker:
     def _varied_part(self, made: Doc, taken: set[str], test: str) -> tuple[int, int]:
         """A field of a record of variable size: its size, and the number of records inside each other."""
         rng, name, roll = self.rng, self.words.name(taken), self.rng.random()
-        inner = [name for name, each in self.varied.items() if each.depth == 1 and not each.rests]
+        inner = [name for name, each in self.varied.items() if each.depth < _DEPTH and not each.rests]
         if roll < 0.1 and self.shape.text and self.shape.has_length:
             most = rng.choice((1, 3, 6))
             made[name] = {"type": f"text[{rng.choice((0, most - 1))}..{most}]", "terminator": "00"}
@@ -258,12 +260,12 @@ class FieldMaker:
             made[name] = {"type": f"{kind}[1..3]", "last": other.last, **kept} if other.last else f"{kind}[2]"
             return 3 * other.size, 1
         if roll < 0.85 and inner:
-            kind = rng.choice(inner)
+            kind = rng.choice((*inner, inner[-1]))
             other = self.varied[kind]
             made[name] = kind if rng.random() < 0.5 else f"{kind}[2]"
             if other.last and rng.random() < 0.7:
                 made[name] = {"type": f"{kind}[1..2]", "last": other.last}
-            return 2 * other.size, 1
+            return 2 * other.size, other.depth
         made[name], step = self._plain()
         return step, 0
 
@@ -496,7 +498,7 @@ class FieldMaker:
     def _depth(self, case: Any) -> int:
         """The number of records inside each other in a case of a choice."""
         if isinstance(case, dict) and "type" not in case:
-            return int(bool(case))
+            return int(bool(case)) + max(map(self._depth, case.values()), default=0)
         kind = str(case["type"] if isinstance(case, dict) else case).partition("[")[0]
         return self.arrayed[kind].depth if kind in self.arrayed else 0
 
