@@ -100,6 +100,9 @@ def _of_field(field: Step | Member, span: Span) -> str:
         case BytesStep():
             text = repr(field.stripped(raw).decode("ascii", "backslashreplace"))
             return text if field.text else f"{len(raw)} bytes"
+        case ItemsStep() if field.between:
+            unread = unread_text(field, span.raw) if span.fault else ""
+            return unread or value_text(field.number, field.item.unpack(raw))
         case ItemsStep():
             number = number if field.packed else len(raw) // field.item_size
             return ", ".join(map(str, unpack_items(field, raw, number)))

@@ -166,6 +166,11 @@ class Field:
         return isinstance(self.type, Blob) and bool(self.type.terminator)
 
     @property
+    def omissible(self) -> bool:
+        """Whether there may be no text of it after the last separator: it is optional, or a list."""
+        return self.optional or (isinstance(self.type, Array) and not self.type.length.minimum)
+
+    @property
     def min_size(self) -> int:
         """Minimum size on the wire, 0 if it may be absent."""
         return 0 if self.conditional else self.full_min_size
@@ -174,8 +179,10 @@ class Field:
     def full_min_size(self) -> int:
         """Minimum size on the wire where it is present."""
         match self.type:
-            case Blob() | Array():
+            case Blob():
                 return self.type.size_of(self.type.length.minimum)
+            case Array():
+                return self.type.least_size
             case Records():
                 return self.type.length.minimum * self.type.layout.least
             case Record():
@@ -230,8 +237,9 @@ class Field:
         """Whether the size is constant."""
         if self.conditional or self.walked:
             return False
-        if isinstance(self.type, Scalar):
-            return self.type.text is None or self.type.text.fixed
+        number = self.type.item if isinstance(self.type, Array) else self.type
+        if isinstance(number, Scalar) and number.text is not None and not number.text.fixed:
+            return False
         return not isinstance(self.type, Blob | Array | Records) or self.type.length.fixed
 
     @property
@@ -274,7 +282,7 @@ def greatest_size(fields: Iterable[Field]) -> int:
 def separated_size(fields: Sequence[Field], *, leading: bool) -> tuple[int, int]:
     """The minimum and maximum size of fields with separators between them, or before each of them."""
     without = int(not leading)
-    needed = max((index for index, each in enumerate(fields, 1) if not each.optional), default=0)
+    needed = max((index for index, each in enumerate(fields, 1) if not each.omissible), default=0)
     least = sum(each.min_size for each in fields[:needed]) + max(0, needed - without)
     return least, sum(each.max_size for each in fields) + len(fields) - without
 

@@ -419,12 +419,23 @@ class Array:
     required: bool = False
     #: Only the request tells the number of items; without it there are as many as fit the bytes.
     whole: bool = False
+    #: The byte between items, which are texts; b"" if there is none.
+    between: bytes = b""
     #: Suffix for the name of its number of items.
     quantity: str = field(default="count", init=False)
 
     def size_of(self, number: int) -> int:
-        """Size of so many items."""
-        return packed_size(number, self.item.bits) if self.packed else number * self.item.size
+        """Maximum size of so many items."""
+        if self.packed:
+            return packed_size(number, self.item.bits)
+        return number * self.item.size + max(0, number - 1) * len(self.between)
+
+    @property
+    def least_size(self) -> int:
+        """Minimum size of all items."""
+        if not self.between:
+            return self.size_of(self.length.minimum)
+        return self.length.minimum * self.item.least_size + max(0, self.length.minimum - 1)
 
     def items_in(self, size: int) -> int:
         """Maximum number of items that fit a size."""

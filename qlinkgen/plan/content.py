@@ -309,7 +309,7 @@ def pack_items(step: ItemsStep, numbers: Sequence[int]) -> bytes:
     """The bytes of legal items."""
     if step.packed:
         return pack_row([number & step.item.mask for number in numbers], step.item.bits, step.packed)
-    return b"".join(map(step.item.pack, numbers))
+    return step.between.join(map(step.item.pack, numbers))
 
 
 def unpack_items(step: ItemsStep, data: bytes, number: int) -> list[int]:
@@ -398,11 +398,18 @@ def _unpack_walked(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
                     own.setdefault(value_name(holder), None)
             elif each.walked:
                 own[name] = [] if own.get(name) is None else own[name]  # an array without records
+            elif isinstance(each.step, ItemsStep) and each.step.between:
+                own[name] = [*_listed(own.get(name)), *_listed(_unpacked_at(each, each.data)[name])]
             else:
                 own |= _unpacked_at(each, each.data)
     except Wrong as wrong:
         raise BadContent("length", wrong.path, wrong.at) from None
     return values.of(())
+
+
+def _listed(value: Raw | None) -> list[int]:
+    """The items of a list so far."""
+    return [each for each in value if isinstance(each, int)] if isinstance(value, list) else []
 
 
 class _Values:
@@ -450,6 +457,8 @@ def _public(plan: PayloadPlan, path: str) -> str:
 
 def _counts_of(step: Step, data: bytes) -> Mapping[str, int]:
     """The number of items of a run that has these bytes."""
+    if isinstance(step, ItemsStep) and step.between:
+        return {step.name: int(bool(data))}
     if not isinstance(step, RunStep) or step.fixed:
         return {}
     return {step.name: len(data) // step.item_size}

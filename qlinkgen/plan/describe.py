@@ -178,6 +178,8 @@ def value_text(scalar: Scalar, raw: int) -> str:
 def unread_text(field: Step | Member, raw: bytes) -> str:
     """Text that is neither a number nor a word of its field; "" for coded and for other bytes."""
     integer = field.integer if isinstance(field, ValueStep | ConstantStep | ReservedStep) else None
+    if isinstance(field, ItemsStep) and field.between:
+        integer = field.item
     if integer is None or integer.text is None or len(raw) > integer.size or not integer.stray(raw):
         return ""
     return repr(raw.decode("ascii", "backslashreplace"))

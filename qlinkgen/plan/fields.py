@@ -212,8 +212,9 @@ class Fields:
         if step.packed:
             self._row(step, raw, places)
             return
-        for at in reversed(range(0, len(raw), step.item_size)):
-            if _is_refused(step.item, step.conditions, raw[at : at + step.item_size]):
+        size = len(raw) or 1 if step.between else step.item_size
+        for at in reversed(range(0, len(raw), size)):
+            if _is_refused(step.item, step.conditions, raw[at : at + size]):
                 bad = places[at]
         self._span(step, places, None, bad)
 
@@ -264,7 +265,8 @@ class Fields:
     def _seen(self, of: Step | Member, at: int) -> int:
         """The wrong item, or character."""
         if isinstance(of, ItemsStep):
-            return of.item.unpack(self._payload[at : at + of.item_size])
+            data = self._payload[at : at + of.item_size]
+            return of.item.unpack(data.split(of.between)[0] if of.between else data)
         return self._payload[at]
 
 

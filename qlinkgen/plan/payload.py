@@ -295,13 +295,15 @@ class ItemsStep:
     #: Only the request tells the number of items; without it there are as many as fit the bytes.
     whole: bool
     presence: Presence | None = None
+    #: The byte between items, each of which is a text; b"" if there is none.
+    between: bytes = b""
 
     #: Suffix for the name of the number of items.
     quantity = "count"
 
     @property
     def item_size(self) -> int:
-        """Bytes of one item, which one that is packed does not have."""
+        """Bytes of one item, which one that is packed does not have; the maximum of a text."""
         assert not self.packed
         return self.item.size
 

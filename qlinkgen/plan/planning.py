@@ -181,7 +181,7 @@ class _Planner:
             case Array():
                 return ItemsStep(
                     field.name, place, kind.item.integer, kind.item, kind.length, kind.default, kind.required,
-                    kind.packed, kind.whole,
+                    kind.packed, kind.whole, between=kind.between,
                 )  # fmt: skip
             case Record():
                 return RecordStep(field.name, place, record_plan(kind.layout))

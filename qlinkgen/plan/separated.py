@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from qlinkgen.plan import walk
-from qlinkgen.plan.payload import BytesStep, ConstantStep, PayloadPlan, ReservedStep, ValueStep
+from qlinkgen.plan.payload import BytesStep, ConstantStep, ItemsStep, PayloadPlan, ReservedStep, ValueStep
 from qlinkgen.plan.walk import Visit, Wrong
 
-#: The steps that a text between separators can be.
-TextStep = ValueStep | ConstantStep | ReservedStep | BytesStep
+#: The steps that texts between separators can be.
+TextStep = ValueStep | ConstantStep | ReservedStep | BytesStep | ItemsStep
 
 
 def text_steps(plan: PayloadPlan) -> tuple[TextStep, ...]:
@@ -21,52 +21,88 @@ def text_steps(plan: PayloadPlan) -> tuple[TextStep, ...]:
     return tuple(step for step in plan.steps if isinstance(step, TextStep))
 
 
+def least_texts(step: TextStep) -> int:
+    """Minimum number of texts of a step that is present."""
+    return step.length.minimum if isinstance(step, ItemsStep) else 1
+
+
+def greatest_texts(step: TextStep) -> int:
+    """Maximum number of texts of a step."""
+    return step.length.maximum if isinstance(step, ItemsStep) else 1
+
+
+def needed_steps(plan: PayloadPlan) -> int:
+    """Number of steps up to the last one that cannot be left out."""
+    steps = enumerate(text_steps(plan), 1)
+    return max((index for index, step in steps if step.presence is None and least_texts(step)), default=0)
+
+
 def needed(plan: PayloadPlan) -> int:
     """Minimum number of texts, at least 1: those up to the last one that cannot be absent."""
-    before = int(plan.leading)
-    places = (index for index, step in enumerate(plan.steps, 1 + before) if step.presence is None)
-    return max(places, default=1)
+    texts = sum(map(least_texts, text_steps(plan)[: needed_steps(plan)]))
+    return max(1, texts + plan.leading if texts else 0)
 
 
 def most_texts(plan: PayloadPlan) -> int:
     """Maximum number of texts, the empty one before a leading separator included."""
-    return len(plan.steps) + plan.leading
+    return sum(map(greatest_texts, text_steps(plan))) + plan.leading
+
+
+def open_list(plan: PayloadPlan) -> ItemsStep | None:
+    """The list that takes the rest of the texts, None if there is none; it is the last step."""
+    last = plan.steps[-1] if plan.steps else None
+    return last if isinstance(last, ItemsStep) and not last.fixed else None
 
 
 def characters(step: TextStep) -> tuple[int, int]:
-    """Minimum and maximum number of characters of a text that is not absent."""
+    """Minimum and maximum number of characters of a text, or item, that is not absent."""
     if isinstance(step, BytesStep):
         return step.length.minimum, step.length.maximum
-    text = step.integer.text
+    text = (step.item if isinstance(step, ItemsStep) else step.integer).text
     assert text is not None
     return text.shortest, text.most
 
 
 def joined(plan: PayloadPlan, texts: list[bytes]) -> bytes:
-    """The payload of the texts of all fields."""
-    texts = [b"", *texts] if plan.leading else texts
-    while len(texts) > needed(plan) and not texts[-1]:
-        texts.pop()
-    return plan.separator.join(texts)
+    """The payload of the texts of all steps."""
+    while len(texts) > needed_steps(plan) and not texts[-1]:
+        texts = texts[:-1]
+    texts = texts or [b""] * (not plan.leading)
+    return plan.separator.join([b"", *texts] if plan.leading else texts)
+
+
+def _taken(step: TextStep, texts: list[bytes]) -> list[bytes]:
+    """The texts of a step from those that are left; an absent one is an empty text."""
+    if not isinstance(step, ItemsStep):
+        return texts[:1] or [b""]
+    own = texts if not step.fixed else texts[: step.length.maximum]
+    return [] if own == [b""] and not step.length.minimum else own
 
 
 def visit(plan: PayloadPlan, payload: bytes) -> Iterator[Visit]:
-    """The steps of a payload, each before its value is used to find later ones. Raises Wrong."""
+    """The steps of a payload, each before its value is used to find later ones. Raises Wrong.
+
+    A list is visited once for each item, or once with no bytes if it has none.
+    """
     if not plan.separator:
         yield from walk.visit(plan, payload)
         return
-    texts, steps, at = payload.split(plan.separator), text_steps(plan), 0
+    texts, at = payload.split(plan.separator), 0
     if not needed(plan) <= len(texts) <= most_texts(plan) or (plan.leading and texts[0]):
         raise Wrong("", 0)
     if plan.leading:
         texts, at = texts[1:], min(1, len(payload))
-    for index, step in enumerate(steps):
-        text = texts[index] if index < len(texts) else b""
-        if step.presence is not None and not text:
-            yield Visit(step, at, None)
-        else:
-            least, most = characters(step)
-            if not least <= len(text) <= most:
-                raise Wrong(step.name, at)
-            yield Visit(step, at, text)
-        at = min(at + len(text) + 1, len(payload))
+    for step in text_steps(plan):
+        own = _taken(step, texts)
+        texts = texts[max(1, len(own)) :]
+        if not own:
+            yield Visit(step, at, b"")
+        for text in own:
+            if step.presence is not None and not text:
+                yield Visit(step, at, None)
+            else:
+                least, most = characters(step)
+                if not least <= len(text) <= most:
+                    raise Wrong(step.name, at)
+                yield Visit(step, at, text)
+            at = min(at + len(text) + 1, len(payload))

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 from qlinkgen.model.fields import Field
 from qlinkgen.model.frame import DelimitedFrame, Frame
+from qlinkgen.model.integer import TextForm
 from qlinkgen.model.message import Message
-from qlinkgen.model.types import Blob, Scalar
+from qlinkgen.model.types import Array, Blob, Scalar
 from qlinkgen.model.words import Words
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter
@@ -26,6 +27,12 @@ def separated(
         end = frame.part("terminator")
         excluded += end.constant if end else b""
     barred = bytes(sorted(each for each in {*excluded} if each < 0x80))
+    for field in fields[:-1]:
+        if isinstance(field.type, Array) and not field.type.length.fixed:
+            what = f"nothing tells how many of the texts belong to {field.name}"
+            report.error(
+                _RULE, (*path, field.name), what, "put it last, or give it a constant number", of_key=True
+            )
     return tuple(_checked(field, separator, barred, (*path, field.name), report) for field in fields)
 
 
@@ -67,6 +74,7 @@ def _checked(field: Field, separator: bytes, excluded: bytes, path: Path, report
         what = f"the separator ends {field.name}, which has a terminator too"
         report.error(_RULE, path, what, "remove terminator", of_key=True)
         return field
+    number = kind.item if isinstance(kind, Array) and not kind.packed else kind
     if isinstance(kind, Blob) and kind.text and not kind.pad:
         if field.optional and not kind.length.minimum:
             what = f"an empty {field.name} is the same as an absent one"
@@ -78,15 +86,34 @@ def _checked(field: Field, separator: bytes, excluded: bytes, path: Path, report
             what = f"the default of {field.name} contains the separator, or the end of the frame"
             report.error(_RULE, (*path, "default"), what, "use other characters", of_key=True)
         return replace(field, type=replace(kind, excluded=excluded))
-    elif not isinstance(kind, Scalar) or kind.text is None:
+    if not isinstance(number, Scalar) or number.text is None:
         what = f"{field.name} is not a text, so it may contain the separator"
         hint = "use text, an enum of words, or a number with as: decimal or as: hex"
         report.error(_RULE, path, what, hint, of_key=True)
-    elif isinstance(kind.text, Words) and (inside := kind.text.alphabet & {*excluded}):
+        return field
+    if (fault := _conflict(field.name, number.text, separator, excluded)) is not None:
+        report.error(_RULE, path, *fault, of_key=True)
+    return _listed(field, kind, separator, path, report) if isinstance(kind, Array) else field
+
+
+def _listed(field: Field, kind: Array, separator: bytes, path: Path, report: Reporter) -> Field:
+    """A list of texts."""
+    if kind.length.counted_by:
+        what = f"the number of {field.name} follows from the separators"
+        report.error(_RULE, path, what, "remove the count, and write [0..N]", of_key=True)
+    if field.optional:
+        what = f"{field.name} is a list, which is not optional"
+        report.error(_RULE, (*path, "optional"), what, "put it last, and write [0..N]", of_key=True)
+    return replace(field, type=replace(kind, between=separator))
+
+
+def _conflict(name: str, text: TextForm, separator: bytes, excluded: bytes) -> tuple[str, str] | None:
+    """What is wrong with a number or a word that contains what ends it, and the fix."""
+    if isinstance(text, Words) and (inside := text.alphabet & {*excluded}):
         found = shown(chr(min(inside)))
-        what = f"a word of {kind.text.enum} contains {found}, which divides fields or ends the frame"
-        report.error(_RULE, path, what, "use another separator or terminator", of_key=True)
-    elif separator[0] in kind.text.alphabet:
-        what = f"the separator {shown(separator.decode())} may occur in the number {field.name}"
-        report.error(_RULE, path, what, "use another separator", of_key=True)
-    return field
+        what = f"a word of {text.enum} contains {found}, which divides fields or ends the frame"
+        return what, "use another separator or terminator"
+    if separator[0] in text.alphabet:
+        what = f"the separator {shown(separator.decode())} may occur in the number {name}"
+        return what, "use another separator"
+    return None

@@ -15,25 +15,49 @@ from qlinkgen.model import naming
 from qlinkgen.model.integer import Integer, TextForm
 from qlinkgen.model.words import Words
 from qlinkgen.plan.expr import Within
-from qlinkgen.plan.payload import BytesStep, ConstantStep, PayloadPlan, ReservedStep, ValueStep
-from qlinkgen.plan.separated import TextStep, characters, most_texts, needed, text_steps
+from qlinkgen.plan.payload import BytesStep, ConstantStep, ItemsStep, PayloadPlan, ReservedStep, ValueStep
+from qlinkgen.plan.separated import (
+    TextStep,
+    characters,
+    greatest_texts,
+    most_texts,
+    needed,
+    needed_steps,
+    text_steps,
+)
 
 
 def size_lines(payload: PayloadPlan, layouts: Layouts) -> list[str]:
     """Body of the function that returns the size of the payload of a struct."""
-    least = needed(payload)
+    steps = text_steps(payload)
+    least = max(1, needed_steps(payload) + payload.leading)
     lines = [f"size_t size = {least - 1}U;"]
-    for index, step in enumerate(text_steps(payload), int(payload.leading)):
-        own = [f"size += {_size(step, layouts)};"]
+    for index, step in enumerate(steps, int(payload.leading)):
+        own = (
+            _list_size(step, layouts) if isinstance(step, ItemsStep) else [f"size += {_size(step, layouts)};"]
+        )
         if index >= least:
             # The separators before it, of which those before the last field needed are counted.
             own.insert(0, f"after = {index - least + 1}U;")
-        lines += _guarded(step, own)
+        guard = isinstance(step, ItemsStep) and not step.length.minimum
+        lines += _if(f"message->{step.name}_count > 0U", own) if guard else _guarded(step, own)
     if not any("message->" in line for line in lines):
         lines.append("(void)message;")
-    if least == most_texts(payload):
+    if least == len(steps) + payload.leading:
         return [*lines, "return size;"]
     return [lines[0], "size_t after = 0U;", *lines[1:], "return size + after;"]
+
+
+def _list_size(step: ItemsStep, layouts: Layouts) -> list[str]:
+    """Statements that add the size of a list that has items."""
+    count = f"{step.length.maximum}U" if step.fixed else f"message->{step.name}_count"
+    value = checks.as_unsigned(step.number, f"message->{naming.member(step.name)}[index]")
+    digits = _digits(step.item)
+    one = f"{digits.most}U" if digits.fixed else layouts.text("size", step.item, digits, value)
+    return [
+        f"size += (size_t){count} - 1U;",
+        *loop(count, [f"size += {one};"], count_type(step.length.maximum)),
+    ]
 
 
 def constant_size(payload: PayloadPlan) -> int:
@@ -56,8 +80,14 @@ def _size(step: TextStep, layouts: Layouts) -> str:
             if digits.fixed:
                 return f"{digits.most}U"
             return layouts.text("size", step.integer, digits, _value(step))
+        case ItemsStep():
+            raise AssertionError(f"{step.name} has a size for each item")
         case _:
             assert_never(step)
+
+
+def _if(condition: str, lines: list[str]) -> list[str]:
+    return [f"if ({condition}) {{", *(f"    {line}" for line in lines), "}"]
 
 
 def _value(step: ValueStep) -> str:
@@ -68,7 +98,18 @@ def _guarded(step: TextStep, lines: list[str]) -> list[str]:
     """Statements for a text that may be absent."""
     if step.presence is None or not lines:
         return lines
-    return [f"if (message->has_{step.presence.field}) {{", *(f"    {line}" for line in lines), "}"]
+    return _if(f"message->has_{step.presence.field}", lines)
+
+
+#: Statements that pass a text and the separator after it.
+_ONWARD = [
+    "payload += length;",
+    "size -= length;",
+    "if (size > 0U) {",
+    "    ++payload;",
+    "    --size;",
+    "}",
+]
 
 
 def _digits(integer: Integer) -> TextForm:
@@ -94,7 +135,7 @@ class SeparatedEncoder(Encoder):
         )
         lines += [
             f"const size_t size = {size};",
-            *(["size_t left = size;"] if most_texts(self.payload) > 1 else []),
+            *(["size_t left = size;"] if len(steps) + self.payload.leading > 1 else []),
             "",
         ]
         for step in steps:
@@ -106,7 +147,7 @@ class SeparatedEncoder(Encoder):
             if index or self.payload.leading:
                 onward = ["++payload;", *(["--left;"] if step is not steps[-1] else [])]
                 put = [f"payload[0] = {separator};", *onward]
-                lines += ["if (left > 0U) {", *(f"    {line}" for line in put), "}"]
+                lines += _if("left > 0U", put)
             lines += _guarded(step, self._text(step, last=step is steps[-1]))
         return lines
 
@@ -125,8 +166,11 @@ class SeparatedEncoder(Encoder):
             octets, count = f"message->{naming.member(step.name)}", self._number_of(step)
             barred = [self.layouts.has_octet(octets, count, each) for each in step.excluded]
             self._refuse(barred, "RANGE")
-        else:
-            self._check(step)
+            return
+        if isinstance(step, ItemsStep) and not step.fixed:
+            held = Within(0, (1 << int(count_type(step.length.maximum)[4:-2])) - 1)
+            self._refuse(checks.broken([self.payload.sendable(step)], local(step.name), held, 16), "LENGTH")
+        self._check(step)
 
     def _text(self, step: TextStep, *, last: bool) -> list[str]:
         """Statements that write a text; the pointer is moved on unless it is the ``last``."""
@@ -134,6 +178,8 @@ class SeparatedEncoder(Encoder):
         def onward(size: str) -> list[str]:
             return [] if last else [f"payload += {size};", f"left -= {size};"]
 
+        if isinstance(step, ItemsStep):
+            return self._list(step, last=last)
         if isinstance(step, ConstantStep | ReservedStep):
             octets = step.integer.pack(step.value)
             lines = [
@@ -156,6 +202,20 @@ class SeparatedEncoder(Encoder):
             return [f"{put};"]
         return ["{", f"    const size_t length = {_size(step, self.layouts)};", f"    {put};",
                 *(f"    {line}" for line in onward("length")), "}"]  # fmt: skip
+
+    def _list(self, step: ItemsStep, *, last: bool) -> list[str]:
+        """Statements that write a list with the separators in it."""
+        separator = unsigned(step.between[0], 8, hexadecimal=True)
+        value = checks.as_unsigned(step.number, f"message->{naming.member(step.name)}[index]")
+        digits, lines = _digits(step.item), list[str]()
+        size = f"{digits.most}U"
+        if not digits.fixed:
+            size = "length"
+            lines.append(f"const size_t length = {self.layouts.text('size', step.item, digits, value)};")
+        lines.append(f"{self.layouts.text('put', step.item, digits, 'payload', size, value)};")
+        lines += [f"payload += {size};", *([] if last else [f"left -= {size};"])]
+        put = [f"payload[0] = {separator};", "++payload;", *([] if last else ["--left;"])]
+        return self._loop(step, [*(_if("index > 0U", put) if step.length.maximum > 1 else []), *lines])
 
 
 @dataclass
@@ -181,7 +241,12 @@ class SeparatedDecoder(Decoder):
         lines += self._flushed()
         if plan.leading:
             lines += self._led(separator)
+        before = int(plan.leading)
         for step in steps:
+            before += greatest_texts(step)
+            if isinstance(step, ItemsStep):
+                lines += self._list(step, before - greatest_texts(step))
+                continue
             lines.append(f"length = {prefix}_text_size_(payload, size, {separator});")
             self._text(step)
             inner = self._flushed()
@@ -189,17 +254,30 @@ class SeparatedDecoder(Decoder):
                 has = f"has_{step.presence.field}"
                 lines.append(f"message->{has} = length > 0U;")
             lines += _guarded(step, inner)
-            if step is not steps[-1]:
-                lines += [
-                    "payload += length;",
-                    "size -= length;",
-                    "if (size > 0U) {",
-                    "    ++payload;",
-                    "    --size;",
-                    "}",
-                ]
+            lines += _ONWARD if step is not steps[-1] else []
         self.reads = True
         return lines
+
+    def _list(self, step: ItemsStep, before: int) -> list[str]:
+        """Statements that read a list item by item, after so many other texts."""
+        separator = unsigned(step.between[0], 8, hexadecimal=True)
+        count, head = f"{step.length.maximum}U", list[str]()
+        if not step.fixed:
+            count = "count"
+            left = f"(texts > {before}U) ? (texts - {before}U) : 0U" if before else "texts"
+            head = (
+                [f"size_t count = {left};"] if not step.length.minimum else [f"const size_t count = {left};"]
+            )
+            head += _if("(count == 1U) && (size == 0U)", ["count = 0U;"]) if not step.length.minimum else []
+            head.append(f"message->{step.name}_count = ({count_type(step.length.maximum)})count;")
+        least, most = characters(step)
+        wrong = [f"length != {most}U"] if least == most else [f"length < {least}U", f"length > {most}U"]
+        self.refuse(wrong, "LENGTH")
+        target = f"message->{naming.member(step.name)}[index]"
+        self._assign(target, step.number, self._number(step.item))
+        body = [f"length = {self.layouts.cells()}_text_size_(payload, size, {separator});", *self._flushed()]
+        lines = [*head, *loop(count, [*body, *_ONWARD])]
+        return lines if step.fixed else ["{", *(f"    {line}" for line in lines), "}"]
 
     def _led(self, separator: str) -> list[str]:
         """Statements that pass the separator before the first text."""
@@ -234,6 +312,8 @@ class SeparatedDecoder(Decoder):
                 terms = [f"!{prefix}_is_text_({target}, length)"]
                 terms += [self.layouts.has_octet(target, "length", each) for each in barred]
                 self.refuse(terms, "RANGE")
+            case ItemsStep():
+                raise AssertionError(f"{step.name} is read item by item")
             case _:
                 assert_never(step)
 

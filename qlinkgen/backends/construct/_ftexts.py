@@ -154,6 +154,50 @@ class Word(Construct):
         return self.maximum
 
 
+class TextList(Construct):
+    """From ``minimum`` to ``maximum`` items between separators."""
+
+    def __init__(
+        self, item: Construct, separator: bytes, minimum: int, maximum: int
+    ) -> None:
+        super().__init__()
+        self.item = item
+        self.separator = separator
+        self.minimum = minimum
+        self.maximum = maximum
+        self.sizes = _text_sizes(_innermost(item))
+
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> list[Any]:
+        data = stream_read_entire(stream, path)
+        texts = data.split(self.separator) if data else []
+        if not self.minimum <= len(texts) <= self.maximum:
+            raise RangeError(f"{len(texts)} items", path=path)
+        least, most = self.sizes
+        for text in texts:
+            if not least <= len(text) <= most:
+                raise RangeError(f"{text!r} has {len(text)} characters", path=path)
+        return [self.item.parse(text) for text in texts]
+
+    def _build(
+        self, obj: Sequence[Any], stream: BinaryIO, context: Container, path: str
+    ) -> Sequence[Any]:
+        if not self.minimum <= len(obj) <= self.maximum:
+            raise RangeError(f"{len(obj)} items", path=path)
+        data = self.separator.join([self.item.build(each) for each in obj])
+        stream_write(stream, data, len(data), path)
+        return obj
+
+    def _sizeof(self, context: Container, path: str) -> int:
+        return self.bounds[1]
+
+    @property
+    def bounds(self) -> tuple[int, int]:
+        """Minimum and maximum size."""
+        least, most = self.sizes
+        fewest = self.minimum * least + max(0, self.minimum - 1)
+        return fewest, self.maximum * most + max(0, self.maximum - 1)
+
+
 class BetweenField(TextField):
     """7-bit text without some characters."""
 
@@ -197,7 +241,9 @@ class Separated(Message):
         self.optional = {field for field, _ in optional}
         self.defaults.update({field: None for field, given in optional if not given})
         needed = [
-            i for i, each in enumerate(fields, 1) if each.name not in self.optional
+            i
+            for i, each in enumerate(fields, 1)
+            if each.name not in self.optional and _counts(each)[0]
         ]
         self.needed = max(needed, default=1)
         sizes = [_sizes(each) for each in fields]
@@ -216,9 +262,11 @@ class Separated(Message):
         texts = stream_read_entire(stream, path).split(self.separator)
         if self.leading and texts.pop(0):
             raise RangeError(f"no separator begins {self.name}", path=path)
-        if not self.needed <= len(texts) <= len(self.fields):
+        most = sum(_counts(field)[1] for field in self.fields)
+        needed = sum(_counts(field)[0] for field in self.fields[: self.needed])
+        if not max(needed, 1 - self.leading) <= len(texts) <= most:
             raise RangeError(f"{len(texts)} texts in {self.name}", path=path)
-        texts += [b""] * (len(self.fields) - len(texts))
+        texts = self._by_field(texts)
         values = Container()
         for field, text in zip(self.fields, texts, strict=True):
             if not text and field.name in self.optional:
@@ -233,6 +281,15 @@ class Separated(Message):
             if isinstance(field.subcon, Default):
                 values[field.name] = found
         return values
+
+    def _by_field(self, texts: list[bytes]) -> list[bytes]:
+        """The texts of each field, those of a list with their separators."""
+        cells = []
+        for field in self.fields:
+            number = min(_counts(field)[1], len(texts))
+            cells.append(self.separator.join(texts[:number]))
+            del texts[:number]
+        return cells
 
     def _build(
         self, obj: Values, stream: BinaryIO, context: Container, path: str
@@ -258,9 +315,21 @@ def _is_ignored(field: Renamed) -> bool:
     return isinstance(rebuilt, Rebuild) and not isinstance(rebuilt.subcon, Validator)
 
 
+def _counts(field: Renamed) -> tuple[int, int]:
+    """Minimum and maximum number of texts of a field that is present."""
+    subcon = _innermost(field)
+    if isinstance(subcon, TextList):
+        return subcon.minimum, subcon.maximum
+    return 1, 1
+
+
 def _sizes(field: Renamed) -> tuple[int, int]:
     """Minimum and maximum number of characters that are received."""
     subcon = _innermost(field)
+    return subcon.bounds if isinstance(subcon, TextList) else _text_sizes(subcon)
+
+
+def _text_sizes(subcon: Construct) -> tuple[int, int]:
     if isinstance(subcon, TextNumber):
         return subcon.least if subcon.least == subcon.most else 1, subcon.most
     if isinstance(subcon, Bytes):

@@ -282,9 +282,7 @@ class _Field:
             case BytesStep():
                 return self._octets(step)
             case ItemsStep():
-                kind, item = ("PackedField", _row(step)) if step.packed else ("ArrayField", ())
-                items = Sequence(tuple(_shown(step.number, each) for each in step.default))
-                return self._run(step, kind, (self._types.of(step.number, _item(step)), *item), items)
+                return self._items(step)
             case RecordStep() | RecordsStep():
                 return self._record(step)
             case _:
@@ -304,6 +302,14 @@ class _Field:
             return self._named(step, Call("Default", (text, default)))
         kind, pad = (f"Padded{kind}", (step.pad,)) if step.pad else (kind, ())
         return self._run(step, kind, pad, default)
+
+    def _items(self, step: ItemsStep) -> Named:
+        item = self._types.of(step.number, _item(step))
+        items = Sequence(tuple(_shown(step.number, each) for each in step.default))
+        if step.between:
+            return self._run(step, "TextList", (item, step.between), items)
+        kind, more = ("PackedField", _row(step)) if step.packed else ("ArrayField", ())
+        return self._run(step, kind, (item, *more), items)
 
     def _record(self, step: RecordStep | RecordsStep) -> Named:
         known = Ref(self._types.records[step.record.name])

@@ -6,14 +6,23 @@ from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.backends.python import integers
-from qlinkgen.backends.python.decode import assigned, assigned_targets
+from qlinkgen.backends.python.decode import assigned, assigned_targets, converted
 from qlinkgen.backends.python.layout import indented, literal, wrapped
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.walked import WalkedDecoder, WalkedEncoder
 from qlinkgen.model.integer import Integer
 from qlinkgen.plan.expr import Size, Within
-from qlinkgen.plan.payload import BytesStep, ConstantStep, ReservedStep, ValueStep
-from qlinkgen.plan.separated import TextStep, characters, most_texts, needed, text_steps
+from qlinkgen.plan.payload import BytesStep, ConstantStep, ItemsStep, ReservedStep, ValueStep, limits
+from qlinkgen.plan.separated import (
+    TextStep,
+    characters,
+    greatest_texts,
+    most_texts,
+    needed,
+    needed_steps,
+    open_list,
+    text_steps,
+)
 
 
 @dataclass
@@ -27,8 +36,8 @@ class SeparatedEncoder(WalkedEncoder):
         for step in text_steps(payload):
             lines += self._text(step)
         texts = [*(['b""'] if payload.leading else []), *(f"{step.name}_text" for step in payload.steps)]
-        separator, least = literal(payload.separator), needed(payload)
-        if len(texts) == 1 == least:
+        separator, least = literal(payload.separator), max(1, needed_steps(payload) + payload.leading)
+        if len(texts) == 1:
             return [*lines, f"data = {texts[0]}", *self._framed(name)]
         cut = [f"while len(texts) > {least} and not texts[-1]:", "    texts.pop()"]
         cut = cut if least < len(texts) else []
@@ -45,6 +54,8 @@ class SeparatedEncoder(WalkedEncoder):
         match step:
             case ConstantStep() | ReservedStep():
                 return [f"{local} = {literal(step.integer.pack(step.value))}"]
+            case ItemsStep():
+                return [*self._list(step), *self._flushed(), self._joined(step)]
             case BytesStep():
                 raw = self._octets(step)
                 least, most = characters(step)
@@ -65,6 +76,22 @@ class SeparatedEncoder(WalkedEncoder):
         if step.presence is None:
             return lines
         return [f'{local} = b""', f"if {source} is not None:", *indented(lines)]
+
+    def _list(self, step: ItemsStep) -> list[str]:
+        """Statements that assign the numbers of a list; adds their conditions."""
+        source = f"self.{attribute(step.name)}"
+        item = f"{self.place.use('index')}(item)"
+        if step.number.scaling is not None:
+            item = f"{self.scales[step.name]}.raw(item)"
+        self._terms.append(integers.holds(Within(step.length.minimum, step.length.maximum), f"len({source})"))
+        legal = (integers.holds(rule, "item") for rule in limits(step.number))
+        self._terms += [f"all({each} for item in {step.name}_raw)" for each in legal]
+        return [f"{step.name}_raw = [{item} for item in {source}]"]
+
+    def _joined(self, step: ItemsStep) -> str:
+        self._use_text(step.item)
+        text = integers.to_bytes(step.item, "item")
+        return f"{step.name}_text = {literal(step.between)}.join([{text} for item in {step.name}_raw])"
 
 
 @dataclass
@@ -87,12 +114,22 @@ class SeparatedDecoder(WalkedDecoder):
         wrong = integers.broken(Within(least, most), "len(texts)")
         wrong += " or texts[0]" if payload.leading else ""
         lines += [f"if {wrong}:", self._bad_layout]
-        if least < most:
-            lines.append(f'texts += [b""] * ({most} - len(texts))')
-        names = [f"{step.name}_text" for step in steps]
-        lines += assigned_targets(names, "texts[1:]" if payload.leading else "texts")
-        for index, step in enumerate(steps, int(payload.leading)):
-            lines += self._text(step, f"{place.use('start_of')}(texts, {index})" if index else "0")
+        opened = open_list(payload)
+        whole = most - (opened.length.maximum if opened else 0)
+        if least < whole:
+            lines.append(f'texts += [b""] * ({whole} - len(texts))')
+        lists = any(isinstance(step, ItemsStep) for step in steps)
+        if not lists:
+            names = [f"{step.name}_text" for step in steps]
+            lines += assigned_targets(names, "texts[1:]" if payload.leading else "texts")
+        index = int(payload.leading)
+        for step in steps:
+            if isinstance(step, ItemsStep):
+                lines += self._items_between(step, index)
+            else:
+                lines += [f"{step.name}_text = texts[{index}]"] if lists else []
+                lines += self._text(step, f"{place.use('start_of')}(texts, {index})" if index else "0")
+            index += greatest_texts(step)
         at, behind = Size(), self._needed_back()
         if behind:
             lines.append(f"at = len({place.data}) - {place.trailer}")
@@ -101,6 +138,30 @@ class SeparatedDecoder(WalkedDecoder):
             self._part(part, at)
             at += part.size
         return [*lines, *header, *self._flushed(), *self._absent(), "return message"]
+
+    def _items_between(self, step: ItemsStep, start: int) -> list[str]:
+        """Statements that decode a list, item by item."""
+        local, target = f"{step.name}_texts", f"message.{attribute(step.name)}"
+        stop = f"{start + step.length.maximum}" if step.fixed else ""
+        head = [f"{local} = texts[{start or ''}:{stop}]"]
+        if not step.length.minimum:
+            head += [f'if {local} == [b""]:', f"    {local} = []"]
+        text, raw = f"{step.name}_text", f"{step.name}_raw"
+        least, most = characters(step)
+        self._values.append(f"{raw} = {self._number_in(step.item, text)}")
+        at = f"{self.place.use('start_of')}(texts, {start} + at)"
+        name = attribute(step.name)
+        self._refuse(f"{raw} > {step.item.maximum}", name, text, at)
+        for rule in step.conditions:
+            self._refuse(integers.broken(rule, raw), name, raw, at)
+        item = converted(step.number, raw, self.scales.get(step.name, ""), self.place)
+        body = [
+            f"if {integers.broken(Within(least, most), f'len({text})')}:",
+            self._bad_layout,
+            *self._flushed(),
+            *wrapped(f"{target}.append(", [item], ")", 12),
+        ]
+        return [*head, f"{target} = []", f"for at, {text} in enumerate({local}):", *indented(body)]
 
     def _text(self, step: TextStep, offset: str) -> list[str]:
         local, target = f"{step.name}_text", f"message.{attribute(step.name)}"
@@ -128,6 +189,8 @@ class SeparatedDecoder(WalkedDecoder):
                 ]
                 self._refuse(" or ".join([f"not {local}.isascii()", *barred]), step.name, local, offset)
                 self._values.append(f'{target} = {local}.decode("ascii")')
+            case ItemsStep():
+                raise AssertionError(f"{step.name} is decoded item by item")
             case _:
                 assert_never(step)
         lines += self._flushed()

@@ -287,7 +287,9 @@ class _Frame:
     def _payloads(self) -> Iterator[tuple[str, bytes]]:
         plan, length = self._message.payload, self._envelope.length
         payload = plan.filled(self._good.payload)
-        for step, at in places(plan, payload):
+        # Of a list between separators the first item.
+        firsts = {step.name: (step, at) for step, at in reversed(list(places(plan, payload)))}
+        for step, at in reversed(firsts.values()):
             for name, number, data in _spoilt(step, payload[at:]):
                 yield f"{name} is {number}", payload[:at] + data + payload[at + len(data) :]
         if length is None or length.integer.unpack(self._cells[length.name]) < length.integer.maximum:

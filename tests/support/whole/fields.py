@@ -567,12 +567,26 @@ class FieldMaker:
                     name, _, size_text = spec["as"].rstrip("]").partition("[")
                     least = rng.randint(1, int(size_text))
                     spec["as"] = rng.choice((f"{name}[{least}..{size_text}]", f"{name}[1..{size_text}]"))
-            if optional and rng.random() < 0.5:
+            single = not {"const", "reserved", "default"} & spec.keys() and not spec["type"].startswith(
+                "text"
+            )
+            if single and rng.random() < 0.25:
+                number = rng.choice((1, 2, 3, 8))
+                spec["type"], size = f"{spec['type']}[{number}]", number * (size + 1) - 1
+            elif optional and rng.random() < 0.5:
                 spec["optional"] = True
             if size < room.left:
                 made[self.words.name(taken)] = spec
                 room.left -= size + 1
+        self._opened(made)
         return made
+
+    def _opened(self, made: Doc) -> None:
+        """A list at the end may have fewer items."""
+        last = list(made.values())[-1] if made else {"type": ""}
+        name, _, number = last["type"].partition("[")
+        if number and name != "text" and self.rng.random() < 0.7:
+            last["type"] = f"{name}[{self.rng.choice((0, 0, 1))}..{number}"
 
     def _dated(self, made: list[tuple[str, Any]], taken: set[str]) -> list[tuple[str, Any]]:
         """Some fields begin with a version of the protocol, and others have ended before the newest one."""

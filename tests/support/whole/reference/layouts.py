@@ -242,11 +242,18 @@ class Slot:
         return kind.bytes_of(kind.low) if isinstance(kind, Run | Records) else size_of(kind)
 
     @property
+    def texts(self) -> tuple[int, int]:
+        """Minimum and maximum number of texts between separators."""
+        listed = isinstance(self.kind, Run) and self.kind.item
+        return (self.kind.low, self.kind.most) if listed and isinstance(self.kind, Run) else (1, 1)
+
+    @property
     def text_sizes(self) -> tuple[int, int]:
         """Minimum and maximum number of characters of a text between separators."""
-        kind = self.kind
-        if isinstance(kind, Run):
+        kind: Kind | None = self.kind
+        if isinstance(kind, Run) and kind.item is None:
             return kind.low, kind.most
+        kind = kind.item if isinstance(kind, Run) else kind
         assert isinstance(kind, Number)
         if kind.words:
             sizes = [len(word) for word in kind.words]
@@ -390,13 +397,13 @@ class Message:
     def sizes(self) -> tuple[int, int]:
         """Minimum and maximum size of the payload."""
         if self.separator:  # absent texts at the end are left out with the separators before them
-            sizes = [slot.text_sizes for slot in self.slots]
             first = 0 if self.leading else 1  # of the texts after a separator
-            needed = [at for at, slot in enumerate(self.slots) if not slot.optional]
-            least = max(needed, default=first - 1) + 1 - first
-            return sum(sizes[at][0] for at in needed) + least, sum(high for _, high in sizes) + len(
-                sizes
-            ) - first
+            needed = [at for at, slot in enumerate(self.slots) if not slot.optional and slot.texts[0]]
+            kept = self.slots[: max(needed, default=-1) + 1]
+            separators = sum(slot.texts[0] for slot in kept) - first if kept else 0
+            least = sum(slot.texts[0] * slot.text_sizes[0] for slot in kept if not slot.optional)
+            most = sum(slot.texts[1] * (slot.text_sizes[1] + 1) for slot in self.slots) - first
+            return least + separators, most
         always = [slot for slot in self.slots if not slot.conditional]
         most = most_bytes(self.slots)
         if self.limit is not None and any(slot.walked for slot in self.slots):

@@ -99,6 +99,14 @@ def _texts(message: Message, values: Mapping[str, Raw]) -> bytes:
         slot = message.slots[index]
         if slot.optional and values[slot.name] is None:
             text = b""
+        elif isinstance(slot.kind, Run) and slot.kind.item:
+            given = values[slot.name]
+            assert isinstance(given, list)
+            if not slot.kind.low <= len(given) <= slot.kind.most:
+                raise Wrong("range", f"{len(given)} items")
+            numbers = [_number(slot.kind.item, each) for each in given]
+            text = message.separator.join(_put(slot.kind.item, each) for each in numbers)
+            seen = seen or bool(given)
         else:
             text = _encoded(message.slots, slot, values)
             seen = True
@@ -114,13 +122,19 @@ def _between(message: Message, payload: bytes) -> dict[str, Raw]:
     texts = payload.split(message.separator)
     if message.leading and texts.pop(0):
         raise Wrong("length", "no separator at the beginning")
-    needed = [index for index, slot in enumerate(message.slots) if not slot.optional]
-    least = max(needed, default=-1 if message.leading else 0) + 1
-    if not least <= len(texts) <= len(message.slots):
+    needed = [index for index, slot in enumerate(message.slots) if not slot.optional and slot.texts[0]]
+    least = sum(slot.texts[0] for slot in message.slots[: max(needed, default=-1) + 1])
+    most = sum(slot.texts[1] for slot in message.slots)
+    if not max(least, 0 if message.leading else 1) <= len(texts) <= most:
         raise Wrong("length", f"{len(texts)} texts")
     values: dict[str, Raw] = {}
-    for index, slot in enumerate(message.slots):
-        text, kind = texts[index] if index < len(texts) else b"", slot.kind
+    for slot in message.slots:
+        kind = slot.kind
+        if isinstance(kind, Run) and kind.item:
+            own, texts = texts[: kind.most], texts[kind.most :]
+            values[slot.name] = [] if own == [b""] and not kind.low else _list(slot, kind.item, own)
+            continue
+        text, texts = (texts or [b""])[0], texts[1:]
         if slot.optional and not text:
             values[slot.name] = None
             continue
@@ -131,6 +145,17 @@ def _between(message: Message, payload: bytes) -> dict[str, Raw]:
         if isinstance(kind, Run) and any(each in message.barred for each in text):
             raise Wrong("range", slot.name)
     return values
+
+
+def _list(slot: Slot, item: Number, texts: Sequence[bytes]) -> list[int]:
+    """The items of a list between separators."""
+    found = []
+    for text in texts:
+        least, most = slot.text_sizes
+        if not least <= len(text) <= most:
+            raise Wrong("length", slot.name)
+        found.append(_checked(item, _get(item, text)))
+    return found
 
 
 def _follows(slot: Slot, slots: Sequence[Slot], cells: Mapping[str, bytes]) -> bytes:
