@@ -19,12 +19,14 @@ class Digits:
         least: characters that are sent at least; zeros fill them up.
         most: maximum number of characters.
         point: number of digits after the decimal point, 0 without one.
+        spaced: spaces fill up a decimal number, before its sign. Zeros are received too.
     """
 
     base: Literal[10, 16]
     least: int
     most: int
     point: int = 0
+    spaced: bool = False
 
     @property
     def fixed(self) -> bool:
@@ -50,7 +52,8 @@ class Digits:
     @property
     def alphabet(self) -> frozenset[int]:
         """The bytes of a text."""
-        return frozenset(b"0123456789ABCDEFabcdef" if self.base == 16 else b"+-.0123456789")
+        spaces = frozenset(b" " if self.spaced else b"")
+        return spaces | frozenset(b"0123456789ABCDEFabcdef" if self.base == 16 else b"+-.0123456789")
 
     def text(self, number: int) -> bytes:
         """The text of a number; it is longer than ``most`` if the number is not in range."""
@@ -59,12 +62,15 @@ class Digits:
         digits = b"%0*d" % (self.point + 1, abs(number))
         whole = digits[: -self.point] + b"." + digits[-self.point :] if self.point else digits
         sign = b"-" if number < 0 else b""
+        if self.spaced:
+            return (sign + whole).rjust(self.least)
         return sign + whole.rjust(self.least - len(sign), b"0")
 
     def number(self, text: bytes) -> int | None:
         """The number of a text, None if it has none in these steps. Digits beyond the point may be zeros."""
         if self.base == 16:
             return int(text, 16) if _HEXADECIMAL.match(text) else None
+        text = self.trimmed(text)
         found = _DECIMAL.match(text)
         if found is None or not found[1] + found[2] or found[2][self.point :].strip(b"0"):
             return None
@@ -76,6 +82,10 @@ class Digits:
         """A text of the greatest size that is not a number."""
         return b"G" * self.most
 
+    def trimmed(self, text: bytes) -> bytes:
+        """A text without what fills it up."""
+        return text.lstrip(b" ") if self.spaced else text
+
     @property
     def name(self) -> str:
         """The form as written in a schema, without the number of characters."""
@@ -83,4 +93,5 @@ class Digits:
 
     def __str__(self) -> str:
         """As written in a schema."""
-        return f"{self.name}[{self.least}]" if self.fixed else f"{self.name}[{self.least}..{self.most}]"
+        size = str(self.least) if self.fixed else f"{self.least}..{self.most}"
+        return f"{self.name}[{size}]{' after spaces' if self.spaced else ''}"

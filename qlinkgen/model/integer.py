@@ -164,7 +164,8 @@ class Integer:
         """Whether unused bits are set or digits are wrong, so that the bytes are invalid."""
         if self.text:
             number = self.text.number(data)
-            signed = isinstance(self.text, Digits) and data[:1] in (b"+", b"-") and self.minimum >= 0
+            digits = self.text.trimmed(data) if isinstance(self.text, Digits) else b""
+            signed = digits[:1] in (b"+", b"-") and self.minimum >= 0
             return number is None or signed or not self.minimum <= number <= self.maximum
         if self.bcd:
             return not data.hex().isdecimal()

@@ -119,7 +119,8 @@ class FieldSpec(Fact, Lifetime):
         default=None, description="Bit ranges in wire order; each begins a new byte"
     )
     pad: ByteText | None = Field(
-        default=None, description="Byte that fills up text or bytes of a constant size; not part of the value"
+        default=None,
+        description="Byte that fills up text or bytes of a constant size, or 20 before a decimal number",
     )
     terminator: ByteText | None = Field(
         default=None, description="Character that follows a text of variable size; not part of the value"

@@ -27,6 +27,9 @@ def formed(scalar: Scalar, spec: FieldSpec, base: str, location: Location, *, gr
     """Apply the form of a field to a scalar; ``grouped``: the file has groups of bits."""
     if spec.as_ is None:
         return scalar
+    if spec.pad is not None and (spec.pad != b" " or not spec.as_.startswith("decimal[")):
+        what = "only spaces (pad: 20) fill up a number, one of as: decimal[6]"
+        location.key_fault("bad-digits", "pad", what, "remove it, or write pad: 20")
     if spec.counts is not None or spec.groups or grouped:
         location.reject(spec, ("as",), "a count" if spec.counts else "groups of bits")
     elif spec.packed is not None:
@@ -63,6 +66,7 @@ def _text(scalar: Scalar, spec: FieldSpec, base: str, location: Location) -> Sca
     digits = _digits(scalar, match, point, location)
     if digits is None:
         return scalar
+    digits = replace(digits, spaced=spec.pad is not None)
     text = replace(scalar, chunks=(), text=digits)
     natural = text.natural_minimum, text.natural_maximum
     low, high = (scalar.minimum, scalar.maximum) if scalar.meaning == "bool" else natural

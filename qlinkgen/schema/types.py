@@ -136,7 +136,7 @@ class TypeBuilder:
             self._note_unbounded(text, location)
             return self._blob(spec, text, location)
         plain = self._scalars.named(text.base, location, text.count)
-        location.reject(spec, ("pad", "terminator"), "numbers")
+        location.reject(spec, ("pad", "terminator") if spec.as_ is None else ("terminator",), "numbers")
         if plain is None:
             return None
         if text.count is not None:
@@ -222,7 +222,19 @@ class TypeBuilder:
 
 def _item(spec: FieldSpec, base: str, location: Location) -> FieldSpec:
     """The keys of the items of an array, with the default of their named type."""
-    keys = ["byteorder", "groups", "parts", "scale", "offset", "unit", "range", "raw_range", "packed", "as_"]
+    keys = [
+        "byteorder",
+        "groups",
+        "parts",
+        "scale",
+        "offset",
+        "unit",
+        "range",
+        "raw_range",
+        "packed",
+        "as_",
+        "pad",
+    ]
     keys += ["default"] if "default" not in location.written and not isinstance(spec.default, list) else []
     return FieldSpec(type=base).model_copy(update={key: getattr(spec, key) for key in keys})
 

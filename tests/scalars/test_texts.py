@@ -150,3 +150,31 @@ def test_wrong_keys(field: str, text: str) -> None:
 def test_a_count_is_binary() -> None:
     (fault,) = faults_of('{n: {type: u8, as: "decimal[2]", counts: a}, a: bytes}')
     assert (fault.rule, fault.message) == ("not-applicable", "'as' has no effect on a count")
+
+
+def test_spaces_fill_up_a_number() -> None:
+    fields = """{
+      weight: {type: i32, as: "decimal[9]", scale: 1/1000, pad: 20},
+      list: {type: "u8[2]", as: "decimal[4]", pad: 20, range: 0..200},
+      sign: {type: i8, as: "decimal[4]", pad: 20, const: -7}}"""
+    protocol = protocol_of(fields)
+    plan, live, module = (
+        plan_of(protocol).message("put.request").payload,
+        construct.live(protocol),
+        python.load(protocol),
+    )
+    values, payload = {"weight": -12.3, "list": [7, 200]}, b"  -12.300   7 200  -7"
+    assert module.PutRequest(**values).to_bytes() == payload
+    assert live.payload("put.request", values) == payload
+    assert pack(plan, {"weight": -12300, "list": [7, 200]}) == payload
+    for other in (payload, b"-0012.3000007 200-007"):
+        assert module.PutRequest.from_bytes(other) == module.PutRequest(**values)
+        assert unpack(plan, other) == {"weight": -12300, "list": [7, 200]}
+        assert live.messages["put.request"].parse(other)["weight"] == -12.3
+    for wrong in (b"-  12.300   7 200  -7", b"         " + payload[9:], b"12.300   " + payload[9:]):
+        with pytest.raises(BadContent, match="range"):
+            unpack(plan, wrong)
+        with pytest.raises(module.DecodeError):
+            module.PutRequest.from_bytes(wrong)
+        with pytest.raises(ConstructError):
+            live.messages["put.request"].parse(wrong)

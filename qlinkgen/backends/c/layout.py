@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from qlinkgen.backends.c.crc import field_check
 from qlinkgen.backends.c.forms import Helper, decimal_helpers, row_helpers, wide_helpers
 from qlinkgen.backends.c.names import storage, unsigned, unsigned_type
-from qlinkgen.backends.c.text_forms import Verb, text_helpers
+from qlinkgen.backends.c.text_forms import Verb, form_of, needed_with, text_helpers
 from qlinkgen.backends.c.words import word_helpers
 from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.digits import Digits
@@ -109,8 +109,9 @@ class Layouts:
             self._words.add((text, verb))
             place = given[:1] if verb == "put" else ()
             return f"{self.prefix}_{verb}_word_{text.enum}_({', '.join([*place, given[-1]])})"
-        self._texts.add((text.base, verb))
-        name = f"{self.prefix}_{verb}_{'decimal' if text.base == 10 else 'hex'}_"
+        key, form = form_of(text) if verb != "size" else (text.base, "hex" if text.base == 16 else "decimal")
+        self._texts |= needed_with(key, verb)
+        name = f"{self.prefix}_{verb}_{form}_"
         *others, value = given
         others += [f"{text.least}U", f"{text.most}U"] if verb == "size" else []
         wide = f"(uint64_t){value}" if storage(integer.bits) < 64 else value
@@ -150,13 +151,14 @@ class Layouts:
         return f"({self.cells()}_text_size_({text}, {size}, {unsigned(octet, 8, hexadecimal=True)}) < {size})"
 
     def _text_call(self, verb: str, integer: AnyInteger, text: Digits, place: str, size: str) -> str:
-        self._texts.add((text.base, "get"))
+        key, form = form_of(text)
+        self._texts |= needed_with(key, "get")
         wire = integer.integer if isinstance(integer, Scalar) else integer
         most = unsigned(wire.maximum, 64)
         if text.base == 16:
-            return f"{self.prefix}_{verb}_hex_({place}, {size}, {most})"
+            return f"{self.prefix}_{verb}_{form}_({place}, {size}, {most})"
         limits = f"{text.point}U, {unsigned(-wire.minimum, 64)}, {most}"
-        return f"{self.prefix}_{verb}_decimal_({place}, {size}, {limits})"
+        return f"{self.prefix}_{verb}_{form}_({place}, {size}, {limits})"
 
     def _decimal(self, verb: str, integer: AnyInteger) -> str:
         width, order = storage(integer.bits), "be" if integer.byteorder == "big" else "le"

@@ -6,6 +6,7 @@ from collections.abc import Collection
 from typing import Literal
 
 from qlinkgen.backends.c.forms import Helper
+from qlinkgen.model.digits import Digits
 
 #: A function that a header needs: it reads, writes, or tells the number of characters.
 Verb = Literal["get", "put", "size"]
@@ -91,6 +92,40 @@ static inline void {p}_put_decimal_(uint8_t *to, size_t size, size_t point, uint
     if (negative) {{
         to[0] = 0x2DU;
     }}
+}}"""
+
+_PUT_SPACED = """\
+static inline void {p}_put_spaced_(uint8_t *to, size_t size, size_t point, uint64_t value, uint64_t sign)
+{{
+    const size_t used = {p}_size_decimal_(1U, size, point, value, sign);
+    for (size_t index = 0U; index < (size - used); ++index) {{
+        to[index] = 0x20U;
+    }}
+    {p}_put_decimal_(&to[size - used], used, point, value, sign);
+}}"""
+
+_READ_SPACED = """\
+static inline size_t {p}_spaces_(const uint8_t *from, size_t size)
+{{
+    size_t index = 0U;
+    while ((index < size) && (from[index] == 0x20U)) {{
+        ++index;
+    }}
+    return index;
+}}
+
+static inline bool {p}_is_spaced_(
+    const uint8_t *from, size_t size, size_t point, uint64_t low, uint64_t high)
+{{
+    const size_t spaces = {p}_spaces_(from, size);
+    return {p}_is_decimal_(&from[spaces], size - spaces, point, low, high);
+}}
+
+static inline uint64_t {p}_get_spaced_(
+    const uint8_t *from, size_t size, size_t point, uint64_t low, uint64_t high)
+{{
+    const size_t spaces = {p}_spaces_(from, size);
+    return {p}_get_decimal_(&from[spaces], size - spaces, point, low, high);
 }}"""
 
 _SIZE_DECIMAL = """\
@@ -201,15 +236,35 @@ static inline size_t {p}_texts_(const uint8_t *text, size_t size, uint8_t separa
     return number;
 }}"""
 
+#: In place of a base: a decimal number after spaces.
+_SPACED = -10
+
 _TEXTS = {
     (0, "get"): _CELLS,
     (10, "get"): _READ_DECIMAL,
     (10, "put"): _PUT_DECIMAL,
     (10, "size"): _SIZE_DECIMAL,
+    (_SPACED, "get"): _READ_SPACED,
+    (_SPACED, "put"): _PUT_SPACED,
     (16, "get"): _READ_HEX,
     (16, "put"): _PUT_HEX,
     (16, "size"): _SIZE_HEX,
 }
+
+
+def form_of(text: Digits) -> tuple[int, str]:
+    """The key of the functions of a form, and what their names end with."""
+    if text.spaced:
+        return _SPACED, "spaced"
+    return text.base, "decimal" if text.base == 10 else "hex"
+
+
+def needed_with(key: int, verb: Verb) -> set[tuple[int, Verb]]:
+    """A function and those that it calls."""
+    found: set[tuple[int, Verb]] = {(key, verb)}
+    if key == _SPACED:
+        found |= {(10, "put"), (10, "size")} if verb == "put" else {(10, "get")}
+    return found
 
 
 def text_helpers(prefix: str, needed: Collection[tuple[int, Verb]]) -> list[Helper]:
@@ -217,6 +272,7 @@ def text_helpers(prefix: str, needed: Collection[tuple[int, Verb]]) -> list[Help
     names = {
         0: "Texts between separators",
         10: "A decimal number as text",
+        _SPACED: "A decimal number after spaces",
         16: "A hexadecimal number as text",
     }
     return [

@@ -57,7 +57,8 @@ class Letters(Adapter):
 class TextNumber(Construct):
     """An integer from low to high as text of ``least`` to ``most`` characters.
 
-    ``point`` digits follow the decimal point. One of variable size is all bytes, which the Message limits.
+    ``point`` digits follow the decimal point. One that is ``spaced`` begins with
+    spaces. One of variable size is all bytes, which the Message limits.
     """
 
     def __init__(
@@ -69,6 +70,7 @@ class TextNumber(Construct):
         low: int,
         high: int,
         point: int = 0,
+        spaced: bool = False,
     ) -> None:
         super().__init__()
         self.base = base
@@ -77,6 +79,7 @@ class TextNumber(Construct):
         self.low = low
         self.high = high
         self.point = point
+        self.spaced = spaced
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> int:
         if self.least == self.most:
@@ -91,6 +94,7 @@ class TextNumber(Construct):
     def _number(self, text: bytes) -> int | None:
         if self.base == 16:
             return int(text, 16) if _HEXADECIMAL.match(text) else None
+        text = text.lstrip(b" ") if self.spaced else text
         found = _DECIMAL.match(text)
         if found is None or (self.low >= 0 and text[:1] in (b"+", b"-")):
             return None
@@ -112,7 +116,9 @@ class TextNumber(Construct):
             sign, digits = "-" * (obj < 0), f"{abs(obj):0{self.point + 1}d}"
             if self.point:
                 digits = f"{digits[: -self.point]}.{digits[-self.point :]}"
-            text = sign + digits.rjust(self.least - len(sign), "0")
+            if not self.spaced:
+                digits = digits.rjust(self.least - len(sign), "0")
+            text = (sign + digits).rjust(self.least)
         stream_write(stream, text.encode(), len(text), path)
         return obj
 

@@ -57,7 +57,8 @@ def integer(kind: Integer, *, signed: bool | None = None) -> Node:
     if text := kind.text:
         limits = (("low", kind.minimum), ("high", kind.maximum))
         point = (("point", text.point),) if text.point else ()
-        return Call("TextNumber", (text.base, text.least, text.most), limits + point)
+        spaced = (("spaced", True),) if text.spaced else ()
+        return Call("TextNumber", (text.base, text.least, text.most), limits + point + spaced)
     if kind.bcd:
         swapped = (("swapped", True),) if kind.byteorder == "little" and kind.size > 1 else ()
         return Call("BcdInteger", (kind.size,), swapped)

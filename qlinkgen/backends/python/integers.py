@@ -81,8 +81,12 @@ def text_of(text: TextForm, number: str) -> str:
     """The text of a number."""
     if isinstance(text, Words):
         return f"{words_of(text)}[{number}]"
+    if text.point and text.spaced:
+        return f"decimal({number}, 1, {text.point}).rjust({text.least})"
     if text.point:
         return f"decimal({number}, {text.least}, {text.point})"
+    if text.spaced:
+        return f'b"%{text.least if text.least > 1 else ""}d" % {number}'
     letter = "d" if text.base == 10 else "X"
     return f'b"%{f"0{text.least}" if text.least > 1 else ""}{letter}" % {number}'
 
@@ -92,6 +96,7 @@ def number_in(integer: Integer, text: str) -> str:
     assert integer.text
     if isinstance(integer.text, Words):
         return f"{numbers_of(integer.text)}.get({text}, {integer.maximum + 1})"
+    text = f'{text}.lstrip(b" ")' if integer.text.spaced else text
     if integer.text.base == 16:
         return f"read_hexadecimal({text}, {integer.maximum})"
     return f"read_decimal({text}, {integer.text.point}, {integer.minimum}, {integer.maximum})"

@@ -983,6 +983,7 @@ class FieldMaker:
             size = point + 2 + rng.choice((0, 1, 2, 5))
             spec = {"type": kind, "as": f"decimal[{size}]"}
             spec |= {"scale": f"1/{10**point}"} if point else {}
+            spec |= {"pad": "20"} if rng.random() < 0.25 else {}
             most = min(10 ** (size - (point > 0)), 1 << int(kind[1:]) - (kind[0] == "i")) - 1
         if "scale" not in spec and rng.random() < 0.5:
             low = rng.randint(0, most)

@@ -49,7 +49,10 @@ def _as_text(number: Number, spec: Doc) -> Number:
     low = -(10 ** (digits - 1)) + 1 if digits - 1 > point else 0
     high = min(number.high, base**digits - 1)
     text = (base, least, most, point, max(number.low, low) < 0)
-    return replace(number, low=max(number.low, low), high=high, text=text, pieces=((0, 8),) * most)
+    spaced = "pad" in spec
+    return replace(
+        number, low=max(number.low, low), high=high, text=text, pieces=((0, 8),) * most, spaced=spaced
+    )
 
 
 def byte_pieces(size: int, order: str) -> tuple[tuple[int, int], ...]:
@@ -278,7 +281,7 @@ class Fields:
             text = str(spec["default"])
             default = tuple(text.encode("ascii") if base == "text" else bytes.fromhex(text))
         fill = item.default if item else ord(" ") if base == "text" else 0
-        if "pad" in spec:
+        if "pad" in spec and item is None:
             return Run(item, base == "text", low, high, default, pad=octets(spec["pad"]))
         if "terminator" in spec:
             end = octets(spec["terminator"])

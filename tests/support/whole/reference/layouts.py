@@ -35,6 +35,8 @@ class Number:
     #: Of a number as text: base, minimum and maximum number of characters, digits after the point, whether
     #: it may have a sign.
     text: tuple[int, int, int, int, bool] | None = None
+    #: Spaces fill up its text.
+    spaced: bool = False
     #: Of an enum that is sent as text: its words, whose places are the numbers.
     words: tuple[bytes, ...] = ()
     #: The integer is the bits of a floating-point number, perhaps with bounds.

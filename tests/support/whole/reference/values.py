@@ -292,7 +292,9 @@ def _put(number: Number, raw: int) -> bytes:
         base, least, _, point, _ = number.text
         if base == 16:
             return format(raw, f"0{least}X").encode()
-        return format(Decimal(raw).scaleb(-point), f"0{least}.{point}f").encode()
+        return format(
+            Decimal(raw).scaleb(-point), f"{'>' if number.spaced else '0'}{least}.{point}f"
+        ).encode()
     return put(number.pieces, int(str(raw), 16) if number.bcd else raw)
 
 
@@ -316,6 +318,8 @@ def _get(number: Number, data: bytes) -> int:
 def _of_text(number: Number, data: bytes, text: tuple[int, int, int, int, bool]) -> int:
     """The integer of a text. Raises Wrong."""
     base, _, _, point, signed = text
+    while number.spaced and data.startswith(b" "):
+        data = data[1:]
     alphabet = b"0123456789abcdefABCDEF" if base == 16 else b"0123456789."
     digits = data[1:] if signed and data[:1] in (b"+", b"-") else data
     if any(each not in alphabet for each in digits) or digits.count(b".") > 1 or not digits.strip(b"."):
