@@ -15,7 +15,7 @@ from qlinkgen.model.integer import Integer, pack_row, unpack_row
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan import walk
 from qlinkgen.plan.expr import Condition
-from qlinkgen.plan.openings import is_open
+from qlinkgen.plan.openings import are_closed
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -285,7 +285,7 @@ def _packed_records(step: RecordsStep, value: object) -> bytes:
         raise Unsendable(step.name, value)
     if step.last and not _ends(step, value):
         raise Unsendable(step.name, value)
-    if any(is_open(step, with_decided(step.record.payload, each)) for each in value[:-1]):
+    if not are_closed(step, value[:-1]):
         raise Unsendable(step.name, value)
     return b"".join(_record(f"{step.name}[{i}]", step.record, each) for i, each in enumerate(value))
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from qlinkgen.model.condition import Test
-from qlinkgen.plan.payload import RecordPlan, RecordsStep, RecordStep, value_name
+from qlinkgen.plan.payload import Member, RecordPlan, RecordsStep, RecordStep, ValueStep, value_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,15 +21,22 @@ class Inner:
     inside: tuple[RecordStep, ...]
     test: Test
 
-    def holds(self, values: Mapping[str, object]) -> bool:
-        """Whether it is true of the raw values of the record."""
+    def holds(self, record: RecordPlan, values: Mapping[str, object]) -> bool:
+        """Whether it is true of the raw values of a record, those that are not given at their defaults."""
         for step in self.inside:
-            inner = values[value_name(step)]
+            inner = values.get(value_name(step), {})
             if not isinstance(inner, Mapping):
                 return False
-            values = inner
-        number = values[self.test.value]
+            record, values = step.record, inner
+        number = values[self.test.value] if self.test.value in values else _default(record, self.test.value)
         return isinstance(number, int) and self.test.holds(number)
+
+
+def _default(record: RecordPlan, name: str) -> int | None:
+    """The number that a new record has."""
+    holder = next(each for each in record.payload.settable if each.name == name)
+    assert isinstance(holder, ValueStep | Member)
+    return holder.number.default if holder.presence is None or holder.presence.given else None
 
 
 #: Tests that all hold; () is always true.
@@ -58,6 +65,9 @@ def _openings(record: RecordPlan, inside: tuple[RecordStep, ...]) -> Iterator[Op
             yield tests
 
 
-def is_open(step: RecordsStep, values: Mapping[str, object]) -> bool:
-    """Whether a record with these raw values takes all bytes that are left."""
-    return any(all(each.holds(values) for each in opening) for opening in openings(step))
+def are_closed(step: RecordsStep, records: Iterable[Mapping[str, object]]) -> bool:
+    """Whether none of the records with these raw values takes all bytes that are left."""
+    found = openings(step)
+    return not found or not any(
+        all(each.holds(step.record, values) for each in opening) for values in records for opening in found
+    )

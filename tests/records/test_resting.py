@@ -113,6 +113,11 @@ def test_both_ways(name: str, values: dict[str, Raw], data: str) -> None:
     assert live.parse(name.partition(".")[2], live.wrap(name, wire)).fields == live.messages[name].parse(wire)
 
 
+def test_defaults_of_records_inside_of_others_are_known() -> None:
+    payload = TARGETS.payload("deep.request")
+    assert pack(payload, {"groups": [{"flag": 1, "item": {}}, {"flag": 1, "item": {}}]}).hex() == "010000" * 2
+
+
 @pytest.mark.parametrize(("name", "data", "kind"), WRONG)
 def test_wrong_payloads(name: str, data: str, kind: str) -> None:
     TARGETS.check_refused(name, bytes.fromhex(data), kind)

@@ -11,7 +11,7 @@ from qlinkgen.model.types import Characters, Float, Length, Scalar
 from qlinkgen.plan.content import Raw, Unsendable, broken, by_value, default_of, pack
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import Clear
-from qlinkgen.plan.openings import is_open
+from qlinkgen.plan.openings import are_closed
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -163,8 +163,8 @@ def _ended(step: RecordsStep, records: list[dict[str, Raw]]) -> list[dict[str, R
 def _closed(step: RecordsStep, records: list[dict[str, Raw]]) -> list[dict[str, Raw]]:
     """The records with defaults, or without those before the last one that take all bytes which are left."""
     usual = defaults(step.record.payload)
-    replaced = [] if step.last or is_open(step, usual) else [usual]
-    others = [replaced if is_open(step, each) else [each] for each in records[:-1]]
+    replaced = [usual] if not step.last and are_closed(step, [usual]) else []
+    others = [[each] if are_closed(step, [each]) else replaced for each in records[:-1]]
     return [each for several in others for each in several] + records[-1:]
 
 
