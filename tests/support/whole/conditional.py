@@ -55,7 +55,7 @@ def add(rng: random.Random, frame: Doc) -> None:
 
 def _whole(rng: random.Random, parts: Doc, before: list[str]) -> Doc:
     """Constants and a check value at the end of a frame."""
-    found: Doc = {"late_mark": {"role": "constant", "value": "5A"}} if rng.random() < 0.4 else {}
+    found: Doc = {"late_mark": {"value": "5A"}} if rng.random() < 0.4 else {}
     if not found or rng.random() < 0.8:
         kept = [name for name, spec in parts.items() if spec.get("role") != "checksum" and "if" not in spec]
         at = next(index for index, name in enumerate(kept) if parts[name].get("role") == "payload")
@@ -64,7 +64,7 @@ def _whole(rng: random.Random, parts: Doc, before: list[str]) -> Doc:
         algorithm, kind = rng.choice(_ALGORITHMS)
         found["late_sum"] = {"role": "checksum", "type": kind, "algorithm": algorithm, "over": covered}
         if rng.random() < 0.3:
-            found["late_end"] = {"role": "constant", "value": "0D 0A"}
+            found["late_end"] = {"value": "0D 0A"}
     return found
 
 
