@@ -488,10 +488,6 @@ class FrameKinds:
 
     kind = "kinds"
 
-    def towards(self, direction: str) -> tuple[FrameKind, ...]:
-        """The kinds that a message of a direction may have."""
-        return tuple(each for each in self.kinds if each.only in (None, direction))
-
     @cached_property
     def number_bits(self) -> int:
         """Bits of the longest number of a message in a frame."""

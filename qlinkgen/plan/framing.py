@@ -263,11 +263,11 @@ def frame_plans(frame: Frame) -> Mapping[Direction, FramePlan]:
     """The frames of each direction; directions with the same frame share one object."""
     response = frame_plan(frame)
     if isinstance(frame, FrameKinds):
-        return {
-            "request": response.towards("request"),
-            "response": response.towards("response"),
-            "message": response,
-        }
+        ways: tuple[Direction, ...] = ("request", "response")
+        if not all(any(each.only in (None, way) for each in response.kinds) for way in ways):
+            # No frame goes the other direction: its receivers pass over those of this one.
+            response = _several(tuple(replace(each, only=None) for each in response.kinds))
+        return {**{way: response.towards(way) for way in ways}, "message": response}
     same = not (isinstance(frame, PacketFrame) or (isinstance(frame, DelimitedFrame) and frame.directed))
     request = response if same else frame_plan(frame, "request")
     return {"request": request, "response": response, "message": request}

@@ -6,12 +6,14 @@ import random
 
 import pytest
 
+from qlinkgen.backends import construct
 from qlinkgen.backends.python import load as load_codec
 from qlinkgen.plan import Plan, plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.dissect import dissect
 from qlinkgen.plan.reading import BadFrame
 from qlinkgen.plan.receive import Event, receiver
+from qlinkgen.plan.select import Options
 from qlinkgen.schema import find, load
 from qlinkgen.schema.loader import loads
 
@@ -275,3 +277,29 @@ def test_each_kind_has_a_coding_of_its_own() -> None:
     assert [getattr(each, "NAME", "") or each.kind for each in heard] == found
     assert generated.decode(line).data == generated.decode(packet).data == data
     assert [fault.kind for fault in dissect(plan, wrong, "message").faults] == ["stuffing"]
+
+
+ONE_WAY = """
+qlinkgen: 1
+protocol: {name: one_way, revision: "1", source: Made up}
+byteorder: big
+frames:
+  tell:
+    if: {direction: response}
+    parts: {start: 10, code: {role: message, type: u8}, data: {role: payload, size: 0..4}, stop: 16}
+bus: {kind: master_slave}
+commands: {}
+messages:
+  level: {id: 1, direction: response, fields: {value: u8}}
+"""
+
+
+def test_where_no_frame_goes_one_direction_those_of_the_other_are_passed_over() -> None:
+    protocol, faults = loads(ONE_WAY, "one_way.yaml")
+    assert protocol is not None, faults
+    plan, wire = plan_of(protocol), bytes.fromhex("10 01 07 16")
+    assert construct.live(protocol).frames["response"].parse(wire).message == "level"
+    assert heard(plan, wire) == [("level", 0)]
+    asked = [event.kind for event in receiver(plan, "request").run(wire)]
+    assert [fault.kind for fault in load_codec(protocol).StreamDecoder("request").feed(wire)] == asked
+    assert load_codec(protocol, Options(role="slave")).StreamDecoder("request").feed(wire)

@@ -43,6 +43,8 @@ class Kinds:
             carried = {name for each in sent if each.direction in (way, "message") for name in each.frames}
             for name in [name for name, frame in frames.items() if frame.one_way and name not in carried]:
                 del frames[name]
+        if not all(self.ways.values()):
+            self.ways = dict.fromkeys(self.ways, self.ways["request"] or self.ways["response"])
         for way, frames in self.ways.items():
             for name, frame in frames.items():
                 if not frame.starts and not frame.turned:
