@@ -17,9 +17,10 @@ from qlinkgen.cli.encode import compose
 from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.cli.wire_options import Line, counted, echo_mode, open_line, speed
 from qlinkgen.errors import LinkError, Refused
-from qlinkgen.link.codec import Framed
+from qlinkgen.link.codec import Framed, Module
 from qlinkgen.link.dialogue import Dialogue
 from qlinkgen.link.events import Event, Stray
+from qlinkgen.link.gaps import break_of
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.transaction import Accepts, Question, Reply
 from qlinkgen.model.message import Message
@@ -54,7 +55,8 @@ def send_on_bus(
         raise Failure(f"--count requires endless answers; {request.NAME} has none: omit it")
     with open_line(port, speed(protocol, baud), line) as opened:
         if request.NAME not in {command.request.name for command in protocol.commands}:
-            _tell(opened, request.to_frame(), codec.BUS.bits_per_byte)
+            byte_time = codec.BUS.bits_per_byte / opened.baud
+            _tell(opened, request.to_frame(), byte_time, break_of(cast("Module", codec), byte_time))
             click.echo(f"qlinkgen: {request.NAME} sent; it has no response", err=True)
             return
         timing = timing_of(codec, opened, slack=slack, attempts=attempts)
@@ -87,11 +89,11 @@ def _follow(protocol: Protocol, master: BlockingMaster, request: Framed, count: 
                 break
 
 
-def _tell(port: Port, frame: bytes, bits_per_byte: int) -> None:
-    """Send a frame, and wait until it is transmitted."""
-    port.write(frame)
+def _tell(port: Port, frame: bytes, byte_time: float, after: float) -> None:
+    """Send a frame, after a break unless that takes no time, and wait until it is transmitted."""
+    port.transmit(frame, after)
     if port.capabilities.paced is not Ability.NO:
-        port.sleep(len(frame) * bits_per_byte / port.baud)
+        port.sleep(len(frame) * byte_time)
 
 
 def check_request(protocol: Protocol, message: Message) -> None:

@@ -13,6 +13,12 @@ def silence_of(codec: Module, byte_time: float) -> float:
     return max(silence[0] * byte_time, silence[1])
 
 
+def break_of(codec: Module, byte_time: float) -> float:
+    """Seconds of the break that begins each frame of a protocol, 0 without one."""
+    duration: tuple[float, float] | None = getattr(codec, "BREAK", None)
+    return 0.0 if duration is None else max(duration[0] * byte_time, duration[1])
+
+
 class Gap:
     """The time at which the line has been idle for long enough to end a frame.
 

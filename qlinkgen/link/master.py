@@ -102,6 +102,7 @@ class MasterEngine:
         numbering: the counter of its frames, None without one.
         own: its number, where frames have a destination and a source.
         streams: answers that come until another command stops them.
+        break_time: seconds of the break that a driver sends before each frame, 0 for none.
     """
 
     def __init__(
@@ -145,6 +146,7 @@ class MasterEngine:
         self._broken_echo = EchoBroken(0.0, None, b"", b"")
         self._line = QuietLine(timing.quiet, timing.quiet_limit)
         self._gap = Gap(timing.silence)
+        self.break_time = timing.line_break
         self.streams = Streams(codec, timing, self._gap)
         self._attempts = Attempts()
         self._state = MasterState.IDLE
@@ -405,7 +407,7 @@ class MasterEngine:
         self._line.suspect = False
         if self.verbose:
             self.events.append(Sent(now, pending.node, pending.request, number, frame))
-        on_wire = len(frame) * self._byte_time
+        on_wire = len(frame) * self._byte_time + self.break_time
         if not pending.is_answered:
             if self._paced or self._gap.span:
                 self._line.free_at = now + on_wire + command.allowance
@@ -451,7 +453,7 @@ class MasterEngine:
         self._line.suspect = False
         if self.verbose:
             self.events.append(Sent(now, pending.node, message, self._attempts.number, frame))
-        on_wire = len(frame) * self._byte_time
+        on_wire = len(frame) * self._byte_time + self.break_time
         self._earliest = now + EARLY * on_wire if self._paced else now
         self._go_on(dialogue, now, on_wire)
         return frame

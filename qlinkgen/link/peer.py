@@ -129,6 +129,11 @@ class PeerEngine:
         self.master.verbose = value
 
     @property
+    def break_time(self) -> float:
+        """Seconds of the break that a driver sends before each frame, 0 for none."""
+        return self.master.break_time
+
+    @property
     def busy(self) -> bool:
         """A transaction that this side has begun is in progress."""
         return self.master.busy

@@ -19,7 +19,7 @@ from qlinkgen.link.codec import (
     wrong_size,
 )
 from qlinkgen.link.echo import EchoCanceller
-from qlinkgen.link.gaps import Gap, silence_of
+from qlinkgen.link.gaps import Gap, break_of, silence_of
 from qlinkgen.link.many import nodes_asked
 from qlinkgen.link.numbering import numbering_of, repeat, repeated_of
 from qlinkgen.link.slave_dialogue import PENDING, Answers, Handling, Refusal, SlaveDialogue
@@ -93,6 +93,7 @@ class SlaveEngine:
         node: the behaviour of the node.
         counters: counts of frames.
         numbering: the counter of its frames, None without one.
+        break_time: seconds of the break that a driver sends before each frame, 0 for none.
     """
 
     def __init__(
@@ -160,6 +161,7 @@ class SlaveEngine:
         speed = baud or codec.BUS.baud
         self._byte_time = codec.BUS.bits_per_byte / speed if speed else 0.0
         self._unknown = unknown_requests(codec, self._byte_time)
+        self.break_time = break_of(codec, self._byte_time)
         idle = silence_of(codec, self._byte_time)
         self._gap = Gap(idle + host_slack if idle else 0.0)
         self._echo = EchoCanceller(echo)
@@ -395,7 +397,7 @@ class SlaveEngine:
         else:
             self._flows.sent()
         pause = max(self._turnaround, self._gap.span)
-        self._due = now + len(answer) * self._byte_time + pause
+        self._due = now + len(answer) * self._byte_time + self.break_time + pause
         self.counters.answers += 1
         if self._echo.mode == "expect":
             self._echo.sent(answer)

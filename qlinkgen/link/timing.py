@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 from qlinkgen.link.codec import Command, Framed, Many, Module, OtherReply, StepSpan, meanings
 from qlinkgen.link.echo import PROBE
-from qlinkgen.link.gaps import silence_of
+from qlinkgen.link.gaps import break_of, silence_of
 
 #: Byte times after which a line counts as quiet; also Q.link's response time.
 QUIET_BYTES = 3
@@ -37,6 +37,7 @@ class Timing:
         longest_allowance: longest allowance of any command of the protocol.
         silence: wait for the idle line that ends a frame, delays of the host included; 0 if frames end
             otherwise.
+        line_break: seconds of the break that begins each frame, 0 without one.
     """
 
     baud: int
@@ -47,6 +48,7 @@ class Timing:
     attempts: int = 3
     longest_allowance: float = 0.0
     silence: float = 0.0
+    line_break: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
@@ -77,7 +79,9 @@ class Timing:
         plain = cls(speed, codec.BUS.bits_per_byte, host_slack, longest, paced, attempts)
         idle = silence_of(codec, plain.byte_time)
         silence = idle + host_slack if idle else 0.0
-        return replace(plain, longest_allowance=max(map(plain.allowance, commands)), silence=silence)
+        allowance = max(map(plain.allowance, commands))
+        broken = break_of(codec, plain.byte_time)
+        return replace(plain, longest_allowance=allowance, silence=silence, line_break=broken)
 
     @property
     def byte_time(self) -> float:
@@ -101,14 +105,14 @@ class Timing:
             return 0.0
         sent = command.request.MAX_WIRE_SIZE if request_size is None else request_size
         size = sent + _longest_answer(command)
-        return self.on_wire(size) + self.allowance(command) + self.host_slack + self.silence
+        return self.on_wire(size) + self.allowance(command) + self._slack
 
     def patience(self, command: Command, reply: OtherReply) -> float:
         """Return the time from a pending reply to the answer."""
         if reply.within is None or command.response is None:
             return self.deadline(command, 0)
         byte_times, seconds = reply.within
-        allowance = self._time(byte_times, seconds) + self.host_slack + self.silence
+        allowance = self._time(byte_times, seconds) + self._slack
         return self.on_wire(_longest_answer(command)) + allowance
 
     def duration(self, many: Many) -> float:
@@ -120,17 +124,22 @@ class Timing:
         within: StepSpan | None = getattr(command.many, "next_within", None)
         if within is None:
             return self.deadline(command, 0)
-        return self.on_wire(_longest_answer(command)) + self._time(*within) + self.host_slack + self.silence
+        return self.on_wire(_longest_answer(command)) + self._time(*within) + self._slack
 
     def step(self, step: tuple[str, type[Framed], StepSpan | None]) -> float:
         """Return the time until a frame of a dialogue is complete, after the one before it."""
         _, message, within = step
-        allowance = self._time(*within or (0.0, 0.0)) + self.host_slack + self.silence
+        allowance = self._time(*within or (0.0, 0.0)) + self._slack
         return self.on_wire(message.MAX_WIRE_SIZE) + allowance
 
     def pause(self, reply: OtherReply) -> float:
         """Return the time until a request is sent again, if a reply asks for it."""
         return self._time(*reply.after)
+
+    @property
+    def _slack(self) -> float:
+        """What the host and the frame of an answer add to its bytes."""
+        return self.host_slack + self.silence + self.line_break
 
     def _time(self, byte_times: float, seconds: float) -> float:
         return byte_times * self.byte_time + seconds

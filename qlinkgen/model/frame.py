@@ -194,12 +194,14 @@ class Part:
 class Silence:
     """An idle line that ends a frame: ``byte_times`` on the bus, but at least ``seconds``.
 
-    If ``alone``, nothing else does; otherwise it ends a frame early.
+    If ``alone``, nothing else does; otherwise it ends a frame early. If ``broken``, it is a break of the
+    line, which begins each frame, and so ends the one before it.
     """
 
     byte_times: Fraction
     seconds: Fraction
     alone: bool = False
+    broken: bool = False
 
 
 @dataclass(frozen=True)

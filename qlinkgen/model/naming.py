@@ -35,7 +35,7 @@ _IN_MODULE = frozenset(
     ScaledRule TextRule RecordRule RecordsRule BaseRecord MaybeRule Misplaced NEW Rule OutOfRange Scale
     DecimalScale Marking Struct Decimal Self Any Callable Generator AsyncGenerator Iterable Sequence
     BytesLike ClassVar Final Literal LayoutError EachOf UntilStopped
-    Checksum BUS COMMANDS MESSAGES RECORDS MARKING REFUSALS UNREAD UNREADABLE NAME ID FIELDS RULES
+    Checksum BUS BREAK COMMANDS MESSAGES RECORDS MARKING REFUSALS UNREAD UNREADABLE NAME ID FIELDS RULES
     ADDRESS EMPTY CHECKED""".split()  # noqa: SIM905
 ) | frozenset(dir(builtins))
 

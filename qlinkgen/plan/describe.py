@@ -533,17 +533,20 @@ def id_text(frame: FramePlan, number: int) -> str:
 
 def end_text(frame: FramePlan) -> str:
     """The rule that determines the end of a frame."""
-    early = frame.idle is not None and not frame.idle.alone
-    return _end_text(frame) + (f"; {idle_text(frame.idle)} ends it early" if frame.idle and early else "")
+    if frame.idle is None or frame.idle.alone:
+        return _end_text(frame)
+    verb = "begins each one" if frame.idle.broken else "ends it early"
+    return f"{_end_text(frame)}; {idle_text(frame.idle)} {verb}"
 
 
 def idle_text(silence: Silence) -> str:
-    """The duration of an idle line."""
+    """The duration of an idle line or a break."""
+    what = "a break" if silence.broken else "an idle line"
     times = f"{float(silence.byte_times):g} byte times" if silence.byte_times else ""
     clock = f"{float(silence.seconds * 1_000_000):g} us" if silence.seconds else ""
     if times and clock:
-        return f"an idle line of {times}, at least {clock},"
-    return f"an idle line of {times or clock}"
+        return f"{what} of {times}, at least {clock},"
+    return f"{what} of {times or clock}"
 
 
 def _end_text(frame: FramePlan) -> str:
@@ -560,7 +563,11 @@ def _end_text(frame: FramePlan) -> str:
             return f"the next {end.part.data.hex(' ').upper()}{begins}{after}"
         case BySilence():
             assert frame.idle is not None
-            return f"{idle_text(frame.idle)} alone"
+            return (
+                f"the next break; {idle_text(frame.idle)} begins each one"
+                if frame.idle.broken
+                else f"{idle_text(frame.idle)} alone"
+            )
         case ByTurn():
             return "only its turn in a dialogue tells a frame, whose size follows from the message"
         case ByMark():

@@ -111,6 +111,17 @@ class CommandBuilder:
             report=self._report,
         )
         self._check_only()
+        self._check_breaks()
+
+    def _check_breaks(self) -> None:
+        """Refuse answers whose end only a break tells, which ports do not report."""
+        silence = self._frame.idle if isinstance(self._frame, DelimitedFrame) else None
+        for command in self.commands if silence and silence.broken and silence.alone else ():
+            if command.response is not None:
+                place = ("commands", command.name)
+                what = f"only the next break ends an answer to {command.name}, and ports do not report breaks"
+                hint = "write response: none, or let a length or the message end frames"
+                self._report.error("bad-frame", place, what, hint, of_key=True, needs=(place, ("frame",)))
 
     def _carry(self) -> None:
         """Add the message that carries the answers which only their request tells apart."""

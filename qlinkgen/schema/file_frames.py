@@ -54,6 +54,7 @@ PartRole = Literal[
     "checksum",
     "terminator",
     "idle",
+    "break",
 ]
 #: What a part turns out to be: its role, an integer with bits of several roles, a derived one, or a value.
 PartKind = PartRole | Literal["bits", "derived", "value"]
@@ -154,9 +155,13 @@ class PartSpec(Fact):
     raw_range: AnyRange | None = Field(default=None, description="Legal values, as integers on the wire")
     default: ScalarValue | None = Field(default=None, description="Default of a value, in the unit")
     shared: StrictBool = Field(default=False, description="A terminator that may begin the next frame too")
-    time: Time | None = Field(default=None, description="Silence on the line that ends a frame")
+    time: Time | None = Field(
+        default=None, description="Silence on the line that ends a frame, or break that begins one"
+    )
     at_least: Time | None = Field(default=None, description="Its minimum at high speed")
-    alone: StrictBool = Field(default=False, description="Nothing but the silence ends a frame")
+    alone: StrictBool = Field(
+        default=False, description="Nothing but the silence, or the next break, ends a frame"
+    )
     counts: Names | None = Field(default=None, description="Part, or parts, whose bytes a length counts")
     size: WholeRange | None = Field(default=None, description="Minimum..maximum payload size")
     trim: Annotated[TrimSpec, BeforeValidator(_TrimForms.expanded), _TrimForms] | None = Field(

@@ -209,7 +209,11 @@ class _Checker:
             hint = "begin each kind with a constant that tells it from the others, or with the message id"
             self._error((*path, first), what, hint)
         if frame.idle:
-            what = f"an idle line ends frames of {name}"
+            what = (
+                f"a break begins frames of {name}"
+                if frame.idle.broken
+                else f"an idle line ends frames of {name}"
+            )
             self._error(path, what, "remove it; a length or the message gives the end of a kind of frame")
         end = frame.part("terminator")
         if end is not None and end.constant == frame.preamble:

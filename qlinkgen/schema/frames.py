@@ -145,10 +145,13 @@ class FrameBuilder:
     ) -> DelimitedFrame | None:
         if not self._parts.roles_fit(specs, ("payload",), path):
             return None
-        idle = next((name for name, part in specs.items() if part.told == "idle"), "")
-        last = bool(idle) and list(specs)[-1] == idle
-        silence = self._parts.silence(specs[idle], (*path, idle), last=last) if idle else None
-        specs = {name: part for name, part in specs.items() if name != idle}
+        silences = [name for name, part in specs.items() if part.told in {"idle", "break"}]
+        idle = silences[0] if silences else ""
+        for name in silences[1:]:
+            what = f"{idle} and {name} both end a frame"
+            self._parts.fault("bad-frame", (*path, name), what, "remove one of them")
+        silence = self._parts.silence(specs[idle], (*path, idle), names=[*specs]) if idle else None
+        specs = {name: part for name, part in specs.items() if name not in silences}
         main = _main_check(specs)
         parts = placed(
             tuple(
@@ -213,7 +216,7 @@ class FrameBuilder:
         place, hint = ("frame", "stuffing"), "write coding: {insert: 00, after: A5}"
         what = "stuffing cannot be combined with a terminator" if end else ""
         if alone and not end:
-            what = "stuffing does not apply to frames that only an idle line ends"
+            what = "stuffing does not apply to frames that only an idle line or a break ends"
         elif coded and not end:
             what, hint = "coding says the same as stuffing", "remove one of them"
         if what:

@@ -14,7 +14,7 @@ from qlinkgen.schema.source import Path
 _RULE = "part-direction"
 _DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 #: Roles without which a frame cannot be found, or its message told.
-_COMMON = ("payload", "message", "address", "direction", "length", "terminator", "counter", "idle")
+_COMMON = ("payload", "message", "address", "direction", "length", "terminator", "counter", "idle", "break")
 
 
 def direction_of(spec: PartSpec, report: Reporter, path: Path) -> Direction | None:

@@ -34,6 +34,7 @@ _SINGLE_ROLES = (
     "payload",
     "terminator",
     "idle",
+    "break",
 )
 _VALUE_KEYS = ("scale", "offset", "unit", "range", "raw_range", "default")
 _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
@@ -52,6 +53,7 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "checksum": ("type", "byteorder", "algorithm", "init", "over", "every", "otherwise", "sent", "as"),
     "terminator": ("value", "text", "shared"),
     "idle": ("time", "at_least", "alone"),
+    "break": ("time", "at_least", "alone"),
 }
 _KEYS = (
     "type",
@@ -124,7 +126,7 @@ class PartBuilder:
         """The part described by a mapping; missing keys are reported and replaced by placeholders."""
         role = spec.told
         assert role is not None
-        assert role != "idle"
+        assert role not in {"idle", "break"}
         self.reject(spec, [key for key in _KEYS if key not in _ROLE_KEYS[role]], role, path)
         if role == "constant" and spec.const is not None:
             self.reject(spec, ("value", "text"), "constant with a type", path)
@@ -207,19 +209,24 @@ class PartBuilder:
             return least
         return int(given)
 
-    def silence(self, spec: PartSpec, path: Path, *, last: bool) -> Silence | None:
-        """The silence on the line that ends a frame."""
-        self.reject(spec, [key for key in _KEYS if key not in _ROLE_KEYS["idle"]], "silence", path)
-        if not last:
+    def silence(self, spec: PartSpec, path: Path, *, names: Sequence[str]) -> Silence | None:
+        """The silence that ends a frame, or the break that begins it; ``names`` are those of all parts."""
+        broken = spec.told == "break"
+        what = "break" if broken else "silence"
+        self.reject(spec, [key for key in _KEYS if key not in _ROLE_KEYS["idle"]], what, path)
+        if broken and names[0] != path[-1]:
+            self.fault("bad-frame", path, f"{path[-1]} is not the first part", "move it to the beginning")
+        elif not broken and names[-1] != path[-1]:
             self.fault("bad-frame", path, f"{path[-1]} is not the last part", "move it to the end")
         least = spec.at_least or Duration()
         if least.byte_times:
             what = "the minimum of an idle time depends on the speed of the line"
             self.fault("bad-value", (*path, "at_least"), what, "write a time like 1750 us")
         if spec.time is None:
-            self._lacks("time", "add time: 3.5 bytes", path)
+            self._lacks("time", "add time: 1.3 bytes" if broken else "add time: 3.5 bytes", path)
             return None
-        return Silence(spec.time.byte_times, max(spec.time.seconds, least.seconds), spec.alone)
+        seconds = max(spec.time.seconds, least.seconds)
+        return Silence(spec.time.byte_times, seconds, spec.alone, broken)
 
     def _value(self, name: str, spec: PartSpec, path: Path) -> Part:
         """A part with a value of every frame, or several in its bits."""

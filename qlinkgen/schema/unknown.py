@@ -77,7 +77,7 @@ class UnknownBuilder:
             self._error((*_PATH, name), what, "remove it; such a request is not answered")
             return False
         ended = frame.tells_end
-        if not (ended and frame.preamble) and not frame.idle:
+        if not (ended and frame.preamble) and (frame.idle is None or frame.idle.broken):
             what = f"{'where an unknown request begins' if ended else 'the end of one'} is not known"
             hint = "add a part with role: idle, if a silence ends frames, or remove it"
             self._error((*_PATH, name), what, hint)

@@ -163,7 +163,7 @@ def conversation(
     try:
         while True:
             if frame := engine.bytes_to_send(now):
-                port.write(frame)
+                port.transmit(frame, getattr(engine, "break_time", 0.0))  # of buses
             timer = engine.next_timer()
             if timer is None:
                 return engine.take()

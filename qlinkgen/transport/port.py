@@ -89,6 +89,26 @@ class Port(ABC):
             PortLost: the port was lost or closed.
         """
 
+    def send_break(self, seconds: float) -> None:  # noqa: B027  # most ports have none
+        """Hold the line in a break for some time, once all bytes are transmitted.
+
+        A pty, a simulated line or a raw connection has no breaks: this does nothing there, and the other end
+        receives the frames without them.
+
+        Raises:
+            PortLost: the port was lost or closed.
+        """
+
+    def transmit(self, frame: bytes, after: float = 0.0) -> None:
+        """Write a frame, after a break of so many seconds unless that is 0.
+
+        Raises:
+            PortLost: the port was lost or closed.
+        """
+        if after:
+            self.send_break(after)
+        self.write(frame)
+
     @abstractmethod
     def close(self) -> None:
         """Close the port, even while other threads use it. Closing twice is allowed.

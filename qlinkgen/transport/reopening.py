@@ -70,6 +70,14 @@ class ReopeningPort(Port):
         except PortLost as error:
             raise self._drop(port, error) from error
 
+    def send_break(self, seconds: float) -> None:
+        """See `Port.send_break`."""
+        port = self._present()
+        try:
+            port.send_break(seconds)
+        except PortLost as error:
+            raise self._drop(port, error) from error
+
     @contextmanager
     def hold(self, wake: Callable[[], object]) -> Iterator[int | None]:
         """See `Port.hold`. If another call finds the port lost, that closes it and wakes as well."""

@@ -10,6 +10,7 @@ import contextlib
 import sys
 import time
 from collections.abc import Callable
+from threading import get_ident
 from typing import Literal
 
 from qlinkgen.errors import CapabilityMissing, PortError
@@ -184,6 +185,21 @@ class SerialPort(StreamPort):
             self._drain()
         finally:
             self._direction(False)
+
+    def send_break(self, seconds: float) -> None:
+        """See `Port.send_break`. The system may make it longer, by a millisecond or so."""
+        if self._direction is not None and not self._gone and not self._gate.is_shut:
+            self._direction(True)  # `write` of the frame ends it
+        self._drain()
+        self._enter()
+        try:
+            self._serial.break_condition = True
+            time.sleep(seconds)
+            self._serial.break_condition = False
+        except SYSTEM_ERRORS as error:
+            raise self._lose(error) from error
+        finally:
+            self._gate.leave(get_ident())
 
 
 def _check(name: object, baud: object, parity: object, stop_bits: object) -> None:

@@ -58,6 +58,6 @@ def serving(port: Port, *slaves: Answering) -> Generator[float, bytes, None]:
             if data:
                 slave.receive(data, now)
             if answer := slave.bytes_to_send(now):
-                port.write(answer)
+                port.transmit(answer, getattr(slave, "break_time", 0.0))  # of buses
         timers = [timer for slave in slaves if (timer := slave.next_timer()) is not None]
         data = yield min(LOOK, max(0.0, min(timers, default=now + LOOK) - now))

@@ -55,6 +55,7 @@ class Serial(SerialStream, Protocol):
     """An open port of pyserial; some kinds of port lack the attributes."""
 
     rs485_mode: object
+    break_condition: bool
     set_low_latency_mode: Callable[[bool], None]
 
     def fileno(self) -> int:

@@ -59,6 +59,7 @@ class FrameView:
     check_optional: bool
     max_wire: int
     idle: tuple[int, int] | None
+    broken: bool
 
 
 def own_prefix(prefix: str, way: str) -> str:
@@ -105,11 +106,12 @@ def frame_view(
         check_optional=check_optional,
         max_wire=max_wire,
         idle=_idle(plan),
+        broken=plan.frame.idle is not None and plan.frame.idle.broken,
     )
 
 
 def _idle(plan: Plan) -> tuple[int, int] | None:
-    """Bits and microseconds of a silence that ends a frame."""
+    """Bits and microseconds of a silence that ends a frame, or of a break that begins one."""
     silence = plan.frame.idle
     if silence is None:
         return None

@@ -35,6 +35,7 @@ class UniqueView:
 
     title: str
     idle: tuple[float, float] | None
+    broken: bool
     check: CheckView
     address: AddressView | None
     preamble: str
@@ -198,6 +199,7 @@ class PartsView:
     stuffing: StuffingView | None
     ended: EndedView | None
     idle: tuple[float, float] | None
+    broken: bool
     preamble: str
     begins_with: str
     header: int

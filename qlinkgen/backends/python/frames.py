@@ -138,6 +138,7 @@ def _unique(plan: Plan, receiver: Hunt, title: str, sizes: Sequence[int]) -> Uni
     return UniqueView(
         title=title,
         idle=_idle(plan.frame.idle),
+        broken=plan.frame.idle is not None and plan.frame.idle.broken,
         check=check_view(check.check),
         address=address,
         preamble=literal(envelope.preamble),
@@ -225,6 +226,7 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
         length=length,
         stuffing=_stuffing(plan),
         idle=_idle(plan.frame.idle),
+        broken=plan.frame.idle is not None and plan.frame.idle.broken,
         ended=ended_view(plan.frame, bare=bare) if plan.frame.whole else None,
         preamble=literal(envelope.preamble) if envelope.preamble else "",
         begins_with=envelope.preamble.hex(" "),

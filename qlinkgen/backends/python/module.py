@@ -299,8 +299,9 @@ class Module:
             case KindsView():
                 pass
             case UniqueView() | PartsView():
-                names += ["IDLE"] if view.idle else []
-                names += ["IDLE_ALONE"] if isinstance(view, PartsView) and view.silent else []
+                names += ["BREAK" if view.broken else "IDLE"] if view.idle else []
+                silent = isinstance(view, PartsView) and view.silent and not view.broken
+                names += ["IDLE_ALONE"] if silent else []
         if not isinstance(view, PacketView):
             names += ["encode", *(["Codec"] if view.check and view.check.selectable else [])]
         return sorted(set(names), key=by_kind)

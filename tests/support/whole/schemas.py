@@ -111,6 +111,7 @@ class _Maker:
         if shape.bus == "master_slave" and asks and self.seed % (3 if parties else _LINK) == 1:
             _link(rng, document)
         _stop_answers(random.Random(f"streams {self.seed}"), document)
+        _begin_with_break(random.Random(f"break {self.seed}"), document)
         maker.forget_unused(document)
         if not several:
             _name_parts(rng, document)
@@ -670,6 +671,20 @@ def _may_stop(stop: Doc, begun: Doc) -> bool:
     to_all = begun.get("addressing") == "answered_broadcast" and stop.get("addressing") == "node"
     same = all(stop.get(key) == begun.get(key) for key in ("from", "frame"))
     return same and begun.get("addressing") != "either" and not to_all
+
+
+def _begin_with_break(rng: random.Random, document: Doc) -> None:
+    """Let a break begin the frames that a silence ends, in some schemas."""
+    parts: Doc = document.get("frame", {}).get("parts", {})
+    name = next(
+        (name for name, spec in parts.items() if isinstance(spec, dict) and spec.get("role") == "idle"), ""
+    )
+    if not name or "to_unknown" in document or rng.random() < 0.6:
+        return
+    answered = any(spec["response"] != "none" for spec in document.get("commands", {}).values())
+    if not (parts[name].get("alone") and answered):
+        first = {name: parts.pop(name) | {"role": "break"}}
+        document["frame"]["parts"] = first | parts
 
 
 def _link(rng: random.Random, document: Doc) -> None:

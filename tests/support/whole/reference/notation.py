@@ -85,7 +85,9 @@ def load(text: str) -> Doc:
     parts = document.get("frame", {}).get("parts", {})
     # Silence has no bytes, and frames end without it unless nothing else ends them.
     for name in [
-        name for name, spec in parts.items() if isinstance(spec, dict) and spec.get("role") == "idle"
+        name
+        for name, spec in parts.items()
+        if isinstance(spec, dict) and spec.get("role") in {"idle", "break"}
     ]:
         document["frame"]["silent"] = parts.pop(name).get("alone", False)
     _stuffed(document.get("frame", {}), parts)
