@@ -1,4 +1,4 @@
-"""Six protocols of the library beside their own libraries, in one interleaved run."""
+"""Protocols of the library beside their own libraries, in one interleaved run."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from benchmarks.library_pairs import Pair, checked
 from benchmarks.library_peers import PAIRS
+from benchmarks.library_sentences import nmea
 from benchmarks.measure import Case, Timing, measure
 from benchmarks.peer import PeerMissing
 from benchmarks.report import Goal, Section, number
@@ -15,7 +16,8 @@ Generated Python of schemas of the library beside the library that other people 
 in pure Python: pymavlink without fastcrc. *encode*: objects are built of plain values and encoded;
 *decode*: a stream is decoded and every field of each message is read. Streams come in pieces of 1 to 64
 bytes; frame by frame for pymodbus, which takes all bytes that it has as one frame, and for dynamixel-sdk,
-which reads as many bytes as a packet has. pyubx2 gets fields of bits as bytes, its quicker way."""
+which reads as many bytes as a packet has. pyubx2 gets fields of bits as bytes, its quicker way; pynmea2 is
+given texts, and converts only some of the fields that are read to numbers."""
 
 
 def section(rounds: int) -> Section:
@@ -32,7 +34,7 @@ def section(rounds: int) -> Section:
 
 def _available(missing: list[str]) -> Sequence[Pair]:
     found = []
-    for make in PAIRS:
+    for make in (*PAIRS, nmea):
         try:
             found.append(checked(make()))
         except PeerMissing as reason:

@@ -95,8 +95,11 @@ def spelled(calls: Iterable[str], names: Mapping[str, Any]) -> Encode:
     return found
 
 
-def decoder(module: ModuleType, pieces: Sequence[bytes], direction: str = "") -> Decode:
-    readers = {kind: reader(*kind.FIELDS) for kind in module.MESSAGES.values()}
+def decoder(
+    module: ModuleType, pieces: Sequence[bytes], direction: str = "", beside: Sequence[str] = ()
+) -> Decode:
+    """Decodes pieces of a stream, and reads all fields and some values of the frame."""
+    readers = {kind: reader(*beside, *kind.FIELDS) for kind in module.MESSAGES.values()}
     arguments = (direction,) if direction else ()
 
     def decode() -> list[object]:

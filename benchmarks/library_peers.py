@@ -1,4 +1,4 @@
-"""The libraries of six protocols: the same messages by them and by the schemas of the library."""
+"""The libraries of some protocols: the same messages by them and by the schemas of the library."""
 
 from __future__ import annotations
 
@@ -318,7 +318,7 @@ def dynamixel() -> Pair:
     ] * REPEATS
     frames = encoder(received)()
     stream = b"".join(frames)
-    ours = Side(encoder(sent), decoder(module, frames, "response"))
+    ours = Side(encoder(sent), decoder(module, frames, "response", ("node", "error", "alert")))
     handler: Any = library.Protocol2PacketHandler()
     written: list[bytes] = []
     line = SimpleNamespace(is_using=False, clearPort=lambda: None, isPacketTimeout=lambda: True)
