@@ -15,14 +15,23 @@ if TYPE_CHECKING:
 
 
 def decimal(number: int, least: int, point: int) -> bytes:
-    """The decimal text of a number in steps of 10 ** -point, of at least so many characters."""
-    digits = b"%0*d" % (point + 1, abs(number))
-    text = digits[:-point] + b"." + digits[-point:] if point else digits
-    return b"-" + text.rjust(least - 1, b"0") if number < 0 else text.rjust(least, b"0")
+    """The decimal text of a number with digits after the point, of at least so many characters."""
+    whole, fraction = divmod(abs(number), 10**point)
+    sign = b"-" if number < 0 else b""
+    return b"%b%0*d.%0*d" % (sign, max(1, least - point - len(sign) - 1), whole, point, fraction)
 
 
 def read_decimal(text: bytes, point: int, low: int, high: int) -> int:
-    """The number of a decimal text, in steps of 10 ** -point; high + 1 if it is not one from low to high."""
+    """The number of a decimal text, in steps of 10 ** -point; more than high if it is none from low to high.
+
+    The limit low is not positive.
+    """
+    if point and len(text) > point and text[~point] == 0x2E:
+        digits = text.replace(b".", b"", 1)
+    else:
+        digits = b"" if point else text
+    if digits.isdigit():  # the usual form
+        return int(digits)
     sign = text[:1]
     if low < 0 and sign in (b"-", b"+"):
         text = text[1:]

@@ -337,7 +337,19 @@ def _span(fewest: int, most: int) -> str:
 class Scale:
     """Conversion of a scaled value: value = (raw * factor + bias) / divisor, raw in low..high."""
 
-    __slots__ = ("bias", "ceiling", "divisor", "factor", "floor", "high", "low")
+    __slots__ = (
+        "bias",
+        "ceiling",
+        "divisor",
+        "factor",
+        "floor",
+        "high",
+        "least",
+        "low",
+        "most",
+        "offset",
+        "ratio",
+    )
 
     def __init__(
         self, low: int, high: int, *, factor: int = 1, bias: int = 0, divisor: int = 1
@@ -348,6 +360,10 @@ class Scale:
         # Whole numbers outside of all values that round to a legal step.
         self.floor = (first - abs(factor)) // divisor
         self.ceiling = -((-last - abs(factor)) // divisor)
+        # Raw numbers that floats give with an error of less than a thousandth; none from 1 to 0.
+        small = max(abs(low), abs(high), abs(factor), abs(bias), divisor) < 1 << 40
+        self.least, self.most = (low, high) if small else (1, 0)
+        self.ratio, self.offset = (divisor / factor, bias / factor) if small else (1.0, 0.0)
 
     def value(self, raw: int) -> Value:
         """The value of a raw number, correctly rounded."""
@@ -356,6 +372,12 @@ class Scale:
 
     def raw(self, value: Value) -> int:
         """The nearest raw number, computed exactly, ties to even. Raises OutOfRange."""
+        if value.__class__ is float:
+            steps = value * self.ratio - self.offset
+            if self.least <= steps <= self.most:
+                raw = round(steps)
+                if -0.49 < steps - raw < 0.49:
+                    return raw
         # Checked first, because infinity and NaN have no ratio, and that of 1E+999999 is too large.
         if not self.floor <= value <= self.ceiling or _too_fine(value):
             raise OutOfRange

@@ -277,7 +277,8 @@ class Encoder:
 
     def _use_text(self, integer: Integer) -> None:
         """Import what writes the text of a number."""
-        if isinstance(integer.text, Digits) and integer.text.point:
+        text = integer.text
+        if isinstance(text, Digits) and text.point and (text.spaced or integer.minimum < 0):
             self.place.use("decimal")
 
     def _step(self, step: Step) -> None:  # noqa: C901  # a case a step

@@ -8,7 +8,7 @@ from typing import assert_never
 
 from qlinkgen.backends.python.layout import slice_of
 from qlinkgen.model import naming
-from qlinkgen.model.integer import ByteOrder, Chunk, Integer, TextForm
+from qlinkgen.model.integer import ByteOrder, Chunk, Integer
 from qlinkgen.model.words import Words
 from qlinkgen.plan.expr import Clear, Condition, Legible, OneOf, Size, Term, Within
 from qlinkgen.plan.payload import CountStep
@@ -60,7 +60,7 @@ def put(integer: Integer, number: str, byteorder: ByteOrder) -> tuple[str, tuple
 def to_bytes(integer: Integer, number: str) -> str:
     """The bytes of an integer; raises OverflowError if it does not fit. ``number`` must be a primary."""
     if integer.text:
-        return text_of(integer.text, number)
+        return text_of(integer, number)
     if integer.bcd:
         back = "[::-1]" if integer.byteorder == "little" else ""
         return f'bytes.fromhex(f"{{{number}:0{2 * integer.size}d}}"){back}'
@@ -77,18 +77,28 @@ def numbers_of(words: Words) -> str:
     return f"_NUMBERS_{naming.upper(words.enum)}"
 
 
-def text_of(text: TextForm, number: str) -> str:
+def text_of(integer: Integer, number: str) -> str:
     """The text of a number."""
+    text = integer.text
+    assert text is not None
     if isinstance(text, Words):
         return f"{words_of(text)}[{number}]"
     if text.point and text.spaced:
         return f"decimal({number}, 1, {text.point}).rjust({text.least})"
-    if text.point:
+    if text.point and integer.minimum < 0:
         return f"decimal({number}, {text.least}, {text.point})"
+    if text.point:
+        whole = _width(text.least - text.point - 1)
+        return f'b"%{whole}d.%{_width(text.point)}d" % divmod({number}, {10**text.point})'
     if text.spaced:
         return f'b"%{text.least if text.least > 1 else ""}d" % {number}'
     letter = "d" if text.base == 10 else "X"
-    return f'b"%{f"0{text.least}" if text.least > 1 else ""}{letter}" % {number}'
+    return f'b"%{_width(text.least)}{letter}" % {number}'
+
+
+def _width(least: int) -> str:
+    """The width of a format with at least so many digits."""
+    return f"0{least}" if least > 1 else ""
 
 
 def number_in(integer: Integer, text: str) -> str:

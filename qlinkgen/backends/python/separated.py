@@ -7,7 +7,7 @@ from typing import assert_never
 
 from qlinkgen.backends.python import integers
 from qlinkgen.backends.python.decode import assigned, assigned_targets, converted
-from qlinkgen.backends.python.layout import indented, literal, wrapped
+from qlinkgen.backends.python.layout import in_hex, indented, literal, wrapped
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.walked import WalkedDecoder, WalkedEncoder
 from qlinkgen.model.integer import Integer
@@ -60,7 +60,7 @@ class SeparatedEncoder(WalkedEncoder):
                 raw = self._octets(step)
                 least, most = characters(step)
                 self._terms.append(integers.holds(Within(least, most), f"len({raw})"))
-                self._terms += [f"{literal(bytes((each,)))} not in {raw}" for each in step.excluded]
+                self._terms += [f"{in_hex(each)} not in {raw}" for each in step.excluded]
                 text = raw
             case ValueStep():
                 raw = f"{step.name}_raw"
@@ -182,11 +182,7 @@ class SeparatedDecoder(WalkedDecoder):
                 scale = self.scales.get(step.name, "")
                 self._values += assigned(target, step.number, raw, scale, self.place)
             case BytesStep():
-                barred = [
-                    f"{literal(bytes((each,)))} in {local}"
-                    for each in step.excluded
-                    if each != self._separator
-                ]
+                barred = [f"{in_hex(each)} in {local}" for each in step.excluded if each != self._separator]
                 self._refuse(" or ".join([f"not {local}.isascii()", *barred]), step.name, local, offset)
                 self._values.append(f'{target} = {local}.decode("ascii")')
             case ItemsStep():
