@@ -79,12 +79,12 @@ def placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> Pl
     seeded, main = part in envelope.seeded, part is envelope.check
     checksum = "checksum" if main else f"_CHECKSUM{mark}"
     case = ".upper()" if part.check.value.digits else ""
-    if view.order and view.size <= 2 and part.check.otherwise is None:
+    result = f"crc = {checksum}.compute({covered}, {checksum}.start)"
+    wrong = f"{view.bytes} != frame[{start}:{end}]{case}"
+    if view.order and view.size <= 2:
         place = int(start or "0")
-        sent = integers.joined("frame", range(place, place + view.size), view.order)
-        result = f"crc = {checksum}.compute({covered}, {checksum}.start)"
-        wrong = f"crc != {sent}"
-    else:
+        wrong = f"crc != {integers.joined('frame', range(place, place + view.size), view.order)}"
+    if part.check.otherwise is not None:
         given = f"frame{', message' if seeded else ''}{', checksum' if main else ''}"
         result = f"right = _check{mark}({given})"
         wrong = f"right != frame[{start}:{end}]{case}"

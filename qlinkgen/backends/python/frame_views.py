@@ -164,6 +164,12 @@ class EndedView:
     checks: Sequence[tuple[str, str]]
     coding: CodingView | None
 
+    @property
+    def plain(self) -> bool:
+        """Whether the terminator follows bytes that are sent as they are, and belongs to one frame only."""
+        shared = self.kept or self.lines or self.flag
+        return bool(self.terminator) and self.coding is None and not shared
+
 
 @dataclass(frozen=True)
 class BlocksView:
@@ -291,14 +297,15 @@ class PartsView:
     def quick(self) -> bool:
         """Whether a whole frame can be cut out at once: its end and its bytes are not coded."""
         changed = self.stuffing is not None and (self.stuffing.whole or self.stuffing.coding is not None)
-        return not (self.ended or self.blocks or changed)
+        return not (self.blocks or changed) and (self.ended is None or (self.ended.plain and not self.bare))
 
     @property
     def announced(self) -> bool:
-        """Whether a whole header with the right constants and length makes the decoder wait for its frame."""
+        """Whether a header with the right constants makes the decoder wait for the end of its frame."""
         early = any(each.early for each in self.checks)
         others = any(each.fault and not each.whole for each in self.head_checks)
-        return self.quick and self.length is not None and not early and not others
+        ending = self.length is not None or self.ended is not None
+        return self.quick and ending and not early and not others
 
     @property
     def no_frame(self) -> Sequence[HeadCheck]:

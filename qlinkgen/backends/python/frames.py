@@ -426,7 +426,7 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
         match part:
             case ConstantPart():
                 test = f"not {literal(part.data)}.startswith(head[{start}:{end}])"
-                yield HeadCheck(test, no_frame, "constant", _differs(part.data, start))
+                yield HeadCheck(test, no_frame, "constant", _differs(part.data, start, end))
             case LengthPart() if envelope.before and envelope.before.length:
                 yield _one_of_two(envelope, part, longer=part is envelope.before.length)
             case LengthPart():
@@ -448,13 +448,10 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
                 assert_never(part)
 
 
-def _differs(data: bytes, place: int) -> str:
-    """Whether other bytes are at a place of the frame in the buffer; true or an IndexError if none are."""
+def _differs(data: bytes, start: int, end: int) -> str:
+    """Whether other bytes are in the header of the frame in the buffer."""
     source, base = pieces.BUFFER
-    if len(data) == 1:  # numbers are compared faster
-        return f"{source}[{integers.index_of(base, place)}] != {in_hex(data[0])}"
-    ends = (integers.index_of(base, each) for each in (place, place + len(data)))
-    return f"{slice_of(source, *ends)} != {literal(data)}"
+    return pieces.differs(data, source, integers.index_of(base, start), integers.index_of(base, end))
 
 
 def _one_of_two(envelope: Envelope, part: LengthPart, *, longer: bool) -> HeadCheck:

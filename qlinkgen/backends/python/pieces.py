@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from qlinkgen.backends.python import integers
-from qlinkgen.backends.python.layout import literal
+from qlinkgen.backends.python.layout import in_hex, literal, slice_of
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.parts import Bits, CellPart, ConstantPart, EqualPart, Numeric, Part
 
@@ -62,8 +62,16 @@ def wrong(envelope: Envelope, part: Part, source: str, base: str = "") -> Iterat
 def tail_tests(envelope: Envelope, part: Part) -> Iterator[str]:
     """Conditions that hold if a part after the payload is wrong."""
     if isinstance(part, ConstantPart):
-        yield f"not frame[{-envelope.from_end(part)}:].startswith({literal(part.data)})"
+        start = -envelope.from_end(part)
+        yield differs(part.data, "frame", str(start), str(start + part.size or ""))
     yield from wrong(envelope, part, "frame")
+
+
+def differs(data: bytes, source: str, start: str, end: str) -> str:
+    """Whether other bytes are between two indexes; true or an IndexError if none are."""
+    if len(data) == 1:  # numbers are compared faster
+        return f"{source}[{start}] != {in_hex(data[0])}"
+    return f"{slice_of(source, start, end)} != {literal(data)}"
 
 
 def derived_part(part: EqualPart, other: str) -> str:
