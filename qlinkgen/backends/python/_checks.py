@@ -216,7 +216,8 @@ class _Split(dict[int, "Callable[[bytes], tuple[int, ...]]"]):
         self._form = form
 
     def __missing__(self, size: int) -> Callable[[bytes], tuple[int, ...]]:
-        self[size] = unpack = Struct(self._form.format(pairs=size >> 1, odd=size & 1)).unpack
+        form = self._form.format(pairs=size >> 1, odd=size & 1)
+        self[size] = unpack = Struct(form).unpack
         return unpack
 
 

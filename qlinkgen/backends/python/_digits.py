@@ -18,7 +18,8 @@ def decimal(number: int, least: int, point: int) -> bytes:
     """The decimal text of a number with digits after the point, of at least so many characters."""
     whole, fraction = divmod(abs(number), 10**point)
     sign = b"-" if number < 0 else b""
-    return b"%b%0*d.%0*d" % (sign, max(1, least - point - len(sign) - 1), whole, point, fraction)
+    size = max(1, least - point - len(sign) - 1)
+    return b"%b%0*d.%0*d" % (sign, size, whole, point, fraction)
 
 
 def read_decimal(text: bytes, point: int, low: int, high: int) -> int:

@@ -363,7 +363,8 @@ class Scale:
         # Raw numbers that floats give with an error of less than a thousandth; none from 1 to 0.
         small = max(abs(low), abs(high), abs(factor), abs(bias), divisor) < 1 << 40
         self.least, self.most = (low, high) if small else (1, 0)
-        self.ratio, self.offset = (divisor / factor, bias / factor) if small else (1.0, 0.0)
+        self.ratio = divisor / factor if small else 1.0
+        self.offset = bias / factor if small else 0.0
 
     def value(self, raw: int) -> Value:
         """The value of a raw number, correctly rounded."""

@@ -10,7 +10,7 @@ from typing import assert_never
 
 from qlinkgen.backends import python_text
 from qlinkgen.backends.python.integers import numbers_of, words_of
-from qlinkgen.backends.python.layout import WIDTH, in_hex, literal, wrapped
+from qlinkgen.backends.python.layout import WIDTH, in_hex, listing, literal, wrapped
 from qlinkgen.backends.python.names import attribute, class_name
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import (
@@ -64,7 +64,7 @@ def word_tables(enums: Iterable[Enum]) -> list[str]:
     lines: list[str] = []
     for words in (each.words for each in enums if each.words is not None):
         written = list(map(literal, words.words))
-        lines += wrapped(f"{words_of(words)} = (", [*written, ""] if len(written) == 1 else written, ")", 0)
+        lines += listing(f"{words_of(words)} = (", written, ")", 0)
         pairs = [f"{word}: {number}" for number, word in enumerate(written)]
         lines += wrapped(f"{numbers_of(words)} = {{", pairs, "}", 0)
     return lines
