@@ -4,30 +4,51 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from qlinkgen.link.codec import Codec, Message
+from qlinkgen.link.codec import Codec, Message, address_of
 
 
 class Numbering:
-    """The counter of one sender.
+    """The counter of one sender: of its requests to each node, or of its frames.
 
     Attributes:
         per_frame: every frame has a number of its own, repeats included.
     """
 
-    def __init__(self, name: str, modulus: int, *, per_frame: bool, echo: bool) -> None:
-        """``name`` is the attribute of messages; ``echo``: answers repeat the number of their request."""
+    def __init__(
+        self,
+        name: str,
+        modulus: int,
+        *,
+        per_frame: bool,
+        echo: bool,
+        first: int = 0,
+        broadcast: int | None = None,
+    ) -> None:
+        """``name`` is the attribute of messages, ``first`` the number of the first request to a node.
+
+        ``echo``: answers repeat the number of their request.
+        """
         self._name = name
         self._modulus = modulus
         self._echo = echo
-        self._next = 0
+        self._first = first
+        self._broadcast = broadcast
+        self._next: dict[int | None, int] = {}
         self.per_frame = per_frame
 
     def number(self, message: Message) -> None:
-        """Give a message the next number, if its frame has one."""
-        if not _is_counted(message):
-            return
-        setattr(message, self._name, self._next)
-        self._next = (self._next + 1) % self._modulus
+        """Give a message the next number, if the counter counts it."""
+        node = None if self.per_frame else address_of(message)
+        if getattr(message, "COUNTER", None) is not None:
+            number = self._next.get(node, self._first)
+            setattr(message, self._name, number)
+            self._next[node] = (number + 1) % self._modulus
+        if (restart := getattr(message, "RESTART", None)) is not None:
+            if node == self._broadcast:
+                self._next.clear()
+                self._first = restart
+            else:
+                self._next[node] = restart
 
     def answer(self, response: Message) -> None:
         """Number an answer, if the protocol says how; see `repeat` for one that repeats its request."""
@@ -35,19 +56,18 @@ class Numbering:
             self.number(response)
 
 
-def _is_counted(message: Message) -> bool:
-    """Whether the frame of a message has a counter: some kinds of frame may have none."""
-    return getattr(message, "COUNTER", None) is not None
-
-
 def numbering_of(codec: Codec) -> Numbering | None:
     """The counter of the frames of a protocol, None if they have none."""
-    counters = (getattr(command.request, "COUNTER", None) for command in codec.COMMANDS.values())
+    requests = [command.request for command in codec.COMMANDS.values()]
+    counters = (getattr(each, "COUNTER", None) for each in requests)
     found: tuple[str, int, bool, bool] | None = next((each for each in counters if each), None)
     if found is None:
         return None
     name, modulus, per_frame, echo = found
-    return Numbering(name, modulus, per_frame=per_frame, echo=echo)
+    restarts = (getattr(each, "RESTART", None) for each in requests)
+    first: int = next((each for each in restarts if each is not None), 0)
+    to_all = codec.BUS.broadcast
+    return Numbering(name, modulus, per_frame=per_frame, echo=echo, first=first, broadcast=to_all)
 
 
 def repeated_of(codec: Codec) -> tuple[str, ...]:

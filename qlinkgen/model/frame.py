@@ -72,10 +72,12 @@ class Checksum:
 
 @dataclass(frozen=True, slots=True)
 class Counting:
-    """What a counter counts: new requests, or frames; and whether answers repeat it."""
+    """What a counter counts: new requests to each node, or frames; and whether answers repeat it."""
 
     per_frame: bool = False
     echo: bool = False
+    #: Tests of pieces of the message id, which hold for the messages that it counts; () for all.
+    when: Condition = ()
 
 
 #: Whose number a value of every frame is: that of the receiver or the sender of a frame on a link, or that of
@@ -107,6 +109,8 @@ class PartBits:
     party: Party = ""
     #: They are characters, and so are ids in files.
     text: bool = False
+    #: The direction whose frames have them, None for both; a frame has parts of one direction instead.
+    only: Direction | None = None
     doc: Text = ""
 
     @property
@@ -357,6 +361,12 @@ class DelimitedFrame:
         found = (bits for part in self.parts for bits in part.bits)
         return next((each for each in found if each.counting is not None), None)
 
+    def counts(self, number: int) -> bool:
+        """Whether the counter counts the message with an id; False without a counter."""
+        counting = self.counter.counting if self.counter else None
+        pieces = {bits.name: number >> bits.at & (1 << bits.bits) - 1 for bits in self.id_bits}
+        return counting is not None and all(test.holds(pieces[test.value]) for test in counting.when)
+
     @property
     def master(self) -> PartBits | None:
         """The number of the master among the values, None if there is none."""
@@ -493,8 +503,8 @@ class FrameKinds:
     @cached_property
     def number_bits(self) -> int:
         """Bits of the longest number of a message in a frame."""
-        own = max(sum(bits.bits for bits in each.frame.id_bits) for each in self.kinds)
-        return max(own, max(0, self.turned - 1).bit_length())
+        found = [bits.at + bits.bits for each in self.kinds for bits in each.frame.id_bits]
+        return max(*found, 0, max(0, self.turned - 1).bit_length())
 
     def base(self, family: int) -> int:
         """What is added to the number of a message of a family."""
@@ -517,6 +527,11 @@ class FrameKinds:
     def counter(self) -> PartBits | None:
         """The counter among the values, None if no kind has one."""
         return next((each.frame.counter for each in self.kinds if each.frame.counter), None)
+
+    def counts(self, number: int) -> bool:
+        """Whether a counter counts the message with an id."""
+        own = number & (1 << self.number_bits) - 1
+        return any(each.frame.counts(own) for each in self.carrying(number))
 
     @property
     def repeated(self) -> tuple[str, ...]:

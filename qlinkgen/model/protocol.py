@@ -128,6 +128,18 @@ class Protocol:
         return self.frame.counter if isinstance(self.frame, DelimitedFrame | FrameKinds) else None
 
     @property
+    def restarts(self) -> bool:
+        """Whether the counter begins anew after some commands."""
+        return any(command.restart is not None for command in self.commands)
+
+    def counts(self, message: Message) -> bool:
+        """Whether the counter counts a message."""
+        frame, counter = self.frame, self.counter
+        if not isinstance(frame, DelimitedFrame | FrameKinds) or counter is None:
+            return False
+        return frame.counts(message.id) and any(each.name == counter.name for each in self.beside(message))
+
+    @property
     def master(self) -> PartBits | None:
         """The number of the master among the values of frames, None if there is none."""
         return self.frame.master if isinstance(self.frame, DelimitedFrame) else None

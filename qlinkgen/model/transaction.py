@@ -212,6 +212,8 @@ class Command:
     outcome: Reply | None = None
     #: The side that sends the request.
     asker: Asker = "first"
+    #: The number of the next request to the node, where frames have a counter; None: that after its own.
+    restart: int | None = None
     #: What the fields of its answers repeat.
     echoes: tuple[Echo, ...] = ()
     #: Protocol-specific attributes; names and values are declared in the schema.

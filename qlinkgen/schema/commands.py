@@ -165,6 +165,7 @@ class CommandBuilder:
                 outcome=self._replies.outcome(name, response),
                 in_flight=spec.in_flight or defaults.in_flight or 1,
                 asker=asker_of(self._file, name, self._report),
+                restart=self._restart(spec, path),
                 doc=spec.doc,
                 section=self._section(spec),
                 confirmed=spec.confirmed,
@@ -381,6 +382,23 @@ class CommandBuilder:
         ):
             what = f"{counter} cannot count repeats"
             self._report.error("bad-repeat", place, what, "use a plain unsigned integer", needs=needs)
+
+    def _restart(self, spec: CommandSpec, path: Path) -> int | None:
+        """The number of the request after this one."""
+        counter = self._frame.counter if isinstance(self._frame, DelimitedFrame | FrameKinds) else None
+        if spec.restart is None or self._report.touched(("frame",)) or self._report.touched(("frames",)):
+            return spec.restart
+        what, hint = "", "remove it, or add a part with role: counter"
+        if counter is None or (counter.counting and counter.counting.per_frame):
+            what = "frames have no counter of requests"
+        elif spec.restart >> counter.bits:
+            what = f"{spec.restart} does not fit {counter.name}"
+            hint = f"use 0..{(1 << counter.bits) - 1}"
+        if what:
+            place = (*path, "restart")
+            self._report.error("bad-repeat", place, what, hint, of_key=True, needs=(place, ("frame",)))
+            return None
+        return spec.restart
 
     def _attributes(self, given: Mapping[str, Label], path: Path) -> Mapping[str, Label]:
         """The attributes of a command, including defaults."""

@@ -329,6 +329,10 @@ class ExampleSpec(FileMapping):
 class CommandSpec(Fact, Lifetime):
     """A transaction: request, response and their conditions."""
 
+    restart: Id | None = Field(
+        default=None, description="Number of the next request to the node, if frames have a counter"
+    )
+
     frame: Name | None = Field(
         default=None, description="Kind of its frames, unless the response names another"
     )

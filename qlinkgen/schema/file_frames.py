@@ -96,6 +96,11 @@ class PartBitSpec(BitSpec):
     values: Directions | None = Field(
         default=None, description="The value for each direction; others are of replies with `if`"
     )
+    when: AnyCondition | None = Field(
+        default=None,
+        alias="if",
+        description="Frames that have them: of a direction; the messages that a counter counts",
+    )
 
 
 class TrimSpec(FileMapping):

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.frame import ATTRIBUTE, Checksum, DelimitedFrame, Frame, MarkedFrame, PacketFrame, Part
 from qlinkgen.model.types import Chunk, Scalar
+from qlinkgen.schema.bit_directions import check_counters, each_way
 from qlinkgen.schema.coding import CodingBuilder
 from qlinkgen.schema.file_frames import FrameSpec, KindSpec, MarkedSpec, PartSpec
 from qlinkgen.schema.file_model import SchemaFile
@@ -168,9 +169,11 @@ class FrameBuilder:
             insert, names, after = build_stuffing(stuffed, parts, self._parts, self._report)
             coding = (insert,), names, after
         parts = without_end(parts, coding[1] if coding[0] else (), path, self._report)
+        check_counters(parts, path, self._report)
         resolved = with_parties(parts, self._file, path, self._report)
         if resolved is None:
             return None
+        resolved = each_way(resolved)
         whole = DelimitedFrame(resolved, *coding, silence, spec.doc, spec.section)
         if not all(self._fits(whole.towards(each), path) for each in whole.ways):
             return None

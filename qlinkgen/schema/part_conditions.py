@@ -48,7 +48,9 @@ class PartConditions(ConditionBuilder):
         elif part.role == "length" and part.scalar and not texts:
             self._lengths[part.name] = Value(part.name, part.scalar, part.doc, part.field)
         if not texts:
-            values = (bits for bits in part.bits if bits.type is not None and not bits.party)
+            values = (
+                bits for bits in part.bits if bits.type is not None and not bits.party and not bits.only
+            )
             self._known |= {
                 bits.name: Value(bits.name, bits.type, bits.doc, part.field) for bits in values if bits.type
             }

@@ -122,8 +122,11 @@ class PartBuilder:
                 fit = False
         return fit
 
-    def build(self, name: str, spec: PartSpec, names: Iterable[str], path: Path) -> Part:
-        """The part described by a mapping; missing keys are reported and replaced by placeholders."""
+    def build(self, name: str, spec: PartSpec, names: Mapping[str, PartSpec], path: Path) -> Part:
+        """The part described by a mapping, one of ``names``.
+
+        Missing keys are reported and replaced by placeholders.
+        """
         role = spec.told
         assert role is not None
         assert role not in {"idle", "break"}
@@ -149,7 +152,8 @@ class PartBuilder:
         values = ("direction", "counter", "value", "destination", "source")
         kind: Role = "bits" if role in values else role  # type: ignore[assignment]
         whole = self._pieces.whole(name, spec, scalar, path) if scalar else None
-        bits = self._pieces.inside(spec.bits or {}, scalar, path) if scalar and role == "bits" else ()
+        ways = [each for each, one in names.items() if one.told == "direction"]
+        bits = self._pieces.inside(spec.bits or {}, scalar, ways, path) if scalar and role == "bits" else ()
         if role == "constant" and scalar and whole and len(whole.constants) == 1:
             value, scalar, whole = scalar.integer.pack(whole.constants[0] & scalar.integer.mask), None, None
         elif role == "constant" and scalar:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from qlinkgen.model.fields import FieldType
 from qlinkgen.model.frame import Counting, DelimitedFrame, Frame, Part, PartBits
 from qlinkgen.model.message import Direction
 from qlinkgen.model.types import Bits, Blob, Characters, Flags, Float, Scalar, byte_chunks
+from qlinkgen.schema.bit_directions import bits_direction, counted, other_tests
 from qlinkgen.schema.file_fields import FieldSpec
 from qlinkgen.schema.file_frames import PartBitSpec, PartSpec
 from qlinkgen.schema.notation import NO_ID, StatedId, shown
@@ -99,9 +100,12 @@ class PieceBuilder:
             self._fault("bad-frame", path, what, "use a plain unsigned integer")
         return replace(bits, counting=Counting(spec.per == "frame", spec.echo))
 
-    def inside(self, specs: Mapping[str, PartBitSpec], container: Scalar, path: Path) -> tuple[PartBits, ...]:
-        """The bits of an integer with several roles."""
+    def inside(
+        self, specs: Mapping[str, PartBitSpec], container: Scalar, ways: Sequence[str], path: Path
+    ) -> tuple[PartBits, ...]:
+        """The bits of an integer with several roles; ``ways`` are parts with the direction."""
         found: list[PartBits] = []
+        ways = ("direction", *ways, *(name for name, spec in specs.items() if spec.role == "direction"))
         for name, spec in specs.items():
             place = (*path, "bits", name)
             last = spec.at[1]
@@ -112,10 +116,26 @@ class PieceBuilder:
             bits = self._inside(name, spec, place)
             if bits is None:
                 continue
-            if other := next((each.name for each in found if each.mask & bits.mask), None):
+            bits = self._conditional(bits, spec, ways, place)
+            if other := next(
+                (each.name for each in found if each.mask & bits.mask and _meet(each, bits)), None
+            ):
                 self._fault("bits-overlap", place, f"{name} overlaps {other}", "use different bits")
             found.append(bits)
         return tuple(found)
+
+    def _conditional(self, bits: PartBits, spec: PartBitSpec, ways: Sequence[str], path: Path) -> PartBits:
+        """The bits with the direction whose frames have them, and what a counter counts."""
+        bits = replace(bits, only=bits_direction(spec, ways, path, self._report))
+        if not (others := other_tests(spec, ways)):
+            return bits
+        if bits.counting is None:
+            what = f"{others[0].field} cannot decide whether a frame has {bits.name}"
+            hint = "write if: {direction: request}, or let a part of its own depend on values"
+            self._fault("part-condition", (*path, "if"), what, hint)
+            return bits
+        when = counted(others, path, self._report)
+        return replace(bits, counting=replace(bits.counting, when=when))
 
     def _inside(self, name: str, spec: PartBitSpec, path: Path) -> PartBits | None:
         first, last = spec.at
@@ -177,6 +197,11 @@ class PieceBuilder:
         self._report.error(rule, path, what, hint, of_key=True)
 
 
+def _meet(one: PartBits, other: PartBits) -> bool:
+    """Whether a frame may have both."""
+    return one.only is None or other.only is None or one.only == other.only
+
+
 def _container(number: Scalar | None) -> Scalar:
     """The unsigned integer that holds a number; any for None."""
     bits, chunks = (number.bits, number.chunks) if number else (8, byte_chunks(1, "big"))
@@ -232,7 +257,7 @@ class IdBuilder:
 
         ``way`` is the value that states the direction, if it is another one than that of the direction.
         """
-        number = self._stated(stated, path, f" of {whose}" if whose else "")
+        number = self._stated(stated, direction, path, f" of {whose}" if whose else "")
         if direction == "message" and self._directed:
             what = f"{path[-2]} has no direction, which its frame states"
             hint = "add direction: request or direction: response"
@@ -242,13 +267,14 @@ class IdBuilder:
             return number
         return number | self.direction.directions[way or direction] << self.direction.at
 
-    def _stated(self, stated: StatedId, path: Path, whose: str) -> int:
+    def _stated(self, stated: StatedId, direction: Direction, path: Path, whose: str) -> int:
         given = stated.given
         if not isinstance(self._frame, DelimitedFrame):
             if isinstance(given, str):
                 self._not_number(given, path)
             return (given if isinstance(given, int) else 0 if given else self._missing(path)) + stated.added
-        names = [each.name for each in self._pieces]
+        pieces = [each for each in self._pieces if each.only in (None, direction)]
+        names = [each.name for each in pieces]
         if not names:
             if given not in (None, NO_ID) or stated.added:
                 hint = "remove it, or add a part with role: message"
@@ -257,12 +283,15 @@ class IdBuilder:
         if given is None:
             return self._missing(path)
         if isinstance(given, int | str):
-            if len(names) > 1:
+            if sum(each.only is None for each in pieces) > 1 or (pieces[0].only and len(pieces) > 1):
                 hint = f"write {{{', '.join(f'{name}: NUMBER' for name in names)}}}"
                 self._wrong(path, f"the id consists of {listed(names)}", hint)
                 return 0
-            given = {names[0]: given}
-        return self._added(self._composed(given, names, path), stated.added, path, whose)
+            given = {next((each.name for each in pieces if each.only is None), names[0]): given}
+        if path[0] == "commands" and path[2:] == ("id",):  # that of its command, which states the request's
+            others = {each.name for each in self._pieces if each not in pieces}
+            given = {name: value for name, value in given.items() if name not in others}
+        return self._added(self._composed(given, pieces, path), stated.added, path, whose)
 
     def fixed(self, stated: StatedId, direction: Direction, path: Path) -> tuple[tuple[str, int], ...]:
         """The values of the frame that an id states beside the pieces of the number, and their numbers."""
@@ -280,13 +309,16 @@ class IdBuilder:
                 found.append((name, number))
         return tuple(found)
 
-    def _composed(self, stated: Mapping[str, int | str], names: list[str], path: Path) -> int:
-        if set(stated) - self._values != set(names):
+    def _composed(self, stated: Mapping[str, int | str], pieces: list[PartBits], path: Path) -> int:
+        """The id of these pieces; those that only one direction has may be left out, and are 0 then."""
+        names = [each.name for each in pieces]
+        own = set(stated) - self._values
+        if not set(names) >= own >= {each.name for each in pieces if each.only is None}:
             hint = f"give {listed(names)}, and values of every frame"
             self._wrong(path, f"the id consists of {listed(names)}", hint)
             return 0
-        given = {piece.name: self._piece(piece, stated[piece.name], path) for piece in self._pieces}
-        for piece in self._pieces if len(names) > 1 else ():
+        given = {piece.name: self._piece(piece, stated.get(piece.name, 0), path) for piece in pieces}
+        for piece in pieces if len(names) > 1 else ():
             value = given[piece.name]
             if value >> piece.bits:
                 what, hint = (
@@ -294,7 +326,7 @@ class IdBuilder:
                     f"use 0..{(1 << piece.bits) - 1:#x}",
                 )
                 self._wrong(path, what, hint, "id-does-not-fit")
-        return sum(given[piece.name] << piece.at for piece in self._pieces)
+        return sum(given[piece.name] << piece.at for piece in pieces)
 
     def _piece(self, piece: PartBits, stated: int | str, path: Path) -> int:
         """The number of a piece of an id, which may be written as text."""
@@ -316,7 +348,7 @@ class IdBuilder:
         self._wrong(path, f"{shown(given)} has the wrong type", "write a whole number", "wrong-type")
 
     def _added(self, number: int, added: int, path: Path, whose: str) -> int:
-        most = (1 << sum(piece.bits for piece in self._pieces)) - 1
+        most = (1 << max(piece.at + piece.bits for piece in self._pieces)) - 1
         if not 0 <= number + added <= most:
             what = f"id {number + added:#x}{whose} does not fit the frame"
             self._wrong(path, what, f"use 0..{most:#x}", "id-does-not-fit")

@@ -1,4 +1,7 @@
-"""Stations of a link in C: each asks, and answers the one that asked, with a receiver for each direction."""
+"""Stations of a link in C: each asks, and answers the one that asked, with a receiver for each direction.
+
+Masters number their requests.
+"""
 
 from __future__ import annotations
 
@@ -119,3 +122,44 @@ def test_two_stations_ask_each_other_and_a_third_hears_it(
         "10 is reset by 11", "11 is reset by 10", "10 has an answer of 11", "1 passed over",
         "11 has an answer of 10", "1 passed over", "0 passed over",
     ]  # fmt: skip
+
+
+NUMBERS = r"""
+#include "mbus.h"
+#include <stdio.h>
+
+static uint8_t next[2] = {MBUS_MASTER_FIRST_NUMBER, MBUS_MASTER_FIRST_NUMBER};
+
+static void show(size_t node, uint32_t id)
+{
+    mbus_parts_t parts = MBUS_PARTS_INIT;
+    uint8_t wire[MBUS_MAX_WIRE_SIZE];
+    int size;
+    mbus_master_number(&next[node], id, &parts);
+    size = (id == MBUS_READ_REQUEST_ID)
+               ? mbus_read_request_to_frame((uint8_t)node, &parts, wire, sizeof wire)
+               : mbus_initialise_request_to_frame((uint8_t)node, &parts, wire, sizeof wire);
+    printf("%02x%d ", (unsigned)wire[1], (int)(size == 5));
+}
+
+int main(void)
+{
+    const uint32_t read = MBUS_READ_REQUEST_ID, initialise = MBUS_INITIALISE_REQUEST_ID;
+    show(0, read);
+    show(0, read);
+    show(1, read);
+    show(0, read);
+    show(0, initialise);
+    show(0, read);
+    show(1, read);
+    return 0;
+}
+"""
+
+
+def test_a_master_alternates_the_frame_count_bit(tmp_path: Path, require_tool: Callable[..., str]) -> None:
+    require_tool("gcc", package="gcc")
+    schema = find("mbus").read_text("utf-8")
+    program = built(tmp_path, "gcc", "-O1", "-std=c99", schema=schema, text_of_main=NUMBERS)
+    told = subprocess.run([program], check=True, capture_output=True, text=True).stdout.split()
+    assert told == ["7b1", "5b1", "7b1", "7b1", "401", "7b1", "5b1"]

@@ -107,3 +107,84 @@ def test_codecs_take_the_counter_as_a_value() -> None:
     frame = codec.encode("set.request", {"value": 1, "seq": 9}, 3)
     assert frame[4] == 9
     assert codec.decode(frame, "request").beside == {"seq": 9}
+
+
+TOGGLING = """\
+control:
+      type: u8
+      bits:
+        function: {{at: 0..3, role: message}}
+        fcv: {{at: 4, role: message, if: {{way: request}}}}
+        full: {{at: 4, if: {{way: response}}}}
+        fcb: {{at: 5, role: counter, if: {{way: request, fcv: 1}}}}
+        way: {{at: 6, role: direction, values: {{request: 1, response: 0}}}}"""
+ALTERNATING = (
+    SCHEMA.replace("code: {{role: message, type: u8}}\n    {counter}", TOGGLING)
+    .replace("node, code, data]", "node, control, data]")
+    .replace("nodes: 1..7,", "nodes: 1..7, broadcast: 0,")
+    .replace("id: 5,", "id: {{function: 5, fcv: 1}},")
+    .replace(
+        "response: {{}}}}}}",
+        "response: {{}}}},\n"
+        "  ask: {{id: 4, addressing: node, repeat: safe, request: {{}}, response: {{}}}},\n"
+        "  reset: {{id: 0, addressing: either, restart: 1, repeat: safe, request: {{}}, response: {{}}}}}}",
+    )
+)
+
+
+def alternating() -> Any:
+    protocol, faults = loads(ALTERNATING.format(), "sample")
+    assert protocol is not None, [str(fault) for fault in faults]
+    return python.load(protocol)
+
+
+def controls(engine: MasterEngine, request: Any, *, attempts: int = 1) -> list[int]:
+    """The control byte of each frame of a transaction that is not answered."""
+    run = drive(engine, request, [], next(_CLOCK), attempts=attempts)
+    return [frame[3] for frame in run.frames]
+
+
+def test_a_bit_alternates_with_each_new_request_to_a_node() -> None:
+    module = alternating()
+    engine = master(module)
+    assert controls(engine, module.SetRequest(node=3), attempts=3) == [0x75, 0x75, 0x75]
+    found = [controls(engine, module.SetRequest(node=node))[0] for node in (3, 4, 3, 4)]
+    assert found == [0x55, 0x75, 0x75, 0x55]
+
+
+def test_a_bit_stays_where_it_does_not_count_and_a_reset_sets_it() -> None:
+    module = alternating()
+    engine = master(module)
+    wanted = []
+    for request in (
+        module.SetRequest(node=3, value=1),
+        module.AskRequest(node=3),
+        module.SetRequest(node=3, value=1),
+    ):
+        wanted += controls(engine, request)
+    assert wanted == [0x75, 0x44, 0x55]
+    assert controls(engine, module.SetRequest(node=4, value=1)) == [0x75]
+    assert controls(engine, module.ResetRequest(node=4)) == [0x40]
+    assert [controls(engine, module.SetRequest(node=node, value=1)) for node in (4, 3)] == [[0x75], [0x75]]
+    controls(engine, module.ResetRequest(node=0))  # to all nodes
+    assert [controls(engine, module.SetRequest(node=node, value=1)) for node in (4, 3)] == [[0x75], [0x75]]
+
+
+def test_bits_of_one_direction_are_values_of_its_frames_alone() -> None:
+    protocol, _ = loads(ALTERNATING.format(), "sample")
+    assert protocol is not None
+    codec, module = Codec(plan_of(protocol)), alternating()
+    frame = codec.encode("set.response", {"full": 1}, 3)
+    assert frame[3] == 0x15
+    assert codec.decode(frame, "response").beside == {"full": 1}
+    assert codec.decode(codec.encode("set.request", {"value": 1, "fcb": 1}, 3), "request").beside == {
+        "fcb": 1
+    }
+    assert module.decode_response(frame).full
+    assert not hasattr(module.decode_response(frame), "fcb")
+    wrong = bytearray(module.AskRequest(node=3).to_frame())
+    wrong[3] |= 0x10  # not a message with this bit
+    wrong[-1] = (wrong[-1] + 0x10) & 0xFF
+    with pytest.raises(module.DecodeError) as caught:
+        module.decode_request(bytes(wrong))
+    assert caught.value.kind == "unknown"

@@ -13,6 +13,7 @@ from qlinkgen.backends import c_text
 from qlinkgen.backends.base import banner
 from qlinkgen.backends.c import dispatch, framing
 from qlinkgen.backends.c.constants import EnumView, enum_views, limits
+from qlinkgen.backends.c.counter import counter
 from qlinkgen.backends.c.crc import CrcView, render_of_fields
 from qlinkgen.backends.c.describe import WIDTH
 from qlinkgen.backends.c.example import example_lines, option_lines
@@ -293,6 +294,7 @@ class Header:
             turns=dispatch.turns(self._names, self._protocol.exchanges.values(), self._kept),
             awaited=dispatch.awaited(self._names, self._protocol.exchanges.values(), self._plan.messages),
             dialogues=dispatch.dialogues(self._names, commands) if listens else [],
+            counter=counter(self._plan, self._names, section.view.id_type) if role != "slave" else None,
             before=max((each.listed for each in slave if each.listed), key=attrgetter("most"), default=None),
             streams=[each.begins for each in slave if each.begins],
             several=several(self._names, commands, self._kept) if listens else [],

@@ -52,16 +52,21 @@ def sender_of(frame: FramePlan, prefix: str) -> Sender:
     address_type = unsigned_type(envelope.address[0].bits if envelope.address else 8)
     return Sender(
         address_member(frame.id_name) if address == "id" else "id",
-        unsigned_type(sum(bits.bits for bits in envelope.id) or 8),
+        unsigned_type(_reach(envelope) or 8),
         address,
         address_type if address else "",
         f"{prefix}_parts_t" if envelope.values else "",
     )
 
 
+def _reach(envelope: Envelope) -> int:
+    """Bits of a message number; frames of the other direction may have pieces below those of this one."""
+    return max((bits.at + bits.bits for bits in envelope.id), default=0)
+
+
 def id_bits(frame: FramePlan) -> int:
     """Bits of a message number, above it that of the family of kinds."""
-    numbers = ((each.base, sum(bits.bits for bits in each.envelope.id)) for each in frame.every)
+    numbers = ((each.base, _reach(each.envelope)) for each in frame.every)
     return max((base | (1 << size) - 1).bit_length() for base, size in numbers) or 8
 
 

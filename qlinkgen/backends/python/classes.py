@@ -175,7 +175,8 @@ class ClassBuilder:
     def _message(self, message: MessagePlan) -> ClassModel:
         facts = [f'NAME = "{message.name}"', f"ID = {in_hex(message.id)}"]
         facts.append(f"MAX_WIRE_SIZE = {message.wire_size}")
-        facts += self._kind(message) if self._plan.frame.kinds else []
+        facts += self._kind(message) if self._plan.frame.kinds else self._uncounted(message)
+        facts += self._restart(message)
         facts += [
             f"{seed_name(Seed(name.removeprefix(ATTRIBUTE)))} = {literal(data)}"
             for name, data in message.message.seeds
@@ -235,6 +236,18 @@ class ClassBuilder:
         marked = isinstance(self._plan.frame.end, ByMark)
         return ["CHECKED = True"] if marked and not self._all_checked and message.checked else []
 
+    def _uncounted(self, message: MessagePlan) -> list[str]:
+        """The constant of a message that the counter of frames does not count."""
+        counter = self._plan.protocol.counter
+        if counter is None or self._plan.protocol.counts(message.message):
+            return []
+        return ["COUNTER = None"]
+
+    def _restart(self, message: MessagePlan) -> list[str]:
+        """The constant of a request after which the counter begins anew."""
+        commands = [each for each in self._plan.protocol.commands if each.request is message.message]
+        return [f"RESTART = {each.restart}" for each in commands if each.restart is not None]
+
     def _kind(self, message: MessagePlan) -> list[str]:
         """What tells the kind of its frame, and whether that has an address, values and a counter."""
         base = message.frames[-1].base
@@ -242,7 +255,9 @@ class ClassBuilder:
         names = [attribute(member.name) for _, member in message.envelope.values]
         settled = [f'("{attribute(name)}", {number})' for name, number in message.message.settled]
         counter = self._plan.protocol.counter
-        counted = [values.counter_fact(counter)] if counter and attribute(counter.name) in names else []
+        counts = attribute(counter.name) in names if counter else False
+        counts = counts and self._plan.protocol.counts(message.message)
+        counted = [values.counter_fact(counter)] if counter and counts else []
         return [
             *([f"FAMILY = {in_hex(base)}"] if base else []),
             *([] if addressed else ['ADDRESS = ""']),

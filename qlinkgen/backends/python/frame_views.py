@@ -224,7 +224,11 @@ class PartsView:
     head_checks: Sequence[HeadCheck]
     values: Sequence[str]
     counter: str
-    #: Attribute and number of the master where only answers have it, as a tuple; "" elsewhere.
+    #: It counts some messages, but not all.
+    counts_some: bool
+    #: It begins anew after some commands.
+    restarts: bool
+    #: Attribute with the number of the master, and its default, as a tuple; "" if there is none.
     master: str
     tail_tests: Sequence[str]
     before: ConditionalView | None = None

@@ -246,6 +246,8 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
         head_checks=list(_head_checks(plan, envelope, bare=bare)),
         values=[attribute(member.name) for _, member in whole.values],
         counter=_counter(plan),
+        counts_some=any(not plan.protocol.counts(each.message) for each in plan.messages),
+        restarts=plan.protocol.restarts,
         master=_master(plan),
         tail_tests=[test for part in envelope.back for test in pieces.tail_tests(envelope, part)],
         before=before_view(envelope),

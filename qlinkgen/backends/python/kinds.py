@@ -139,6 +139,7 @@ class KindsView:
         seeds: attributes of message classes that check values cover.
         counted: some kinds have a counter.
         settled: some messages have values that are always the same.
+        restarts: it begins anew after some commands.
         lasts: the last bytes of terminators.
     """
 
@@ -156,6 +157,7 @@ class KindsView:
     seeds: Sequence[str]
     counted: bool
     settled: bool
+    restarts: bool
     lasts: Sequence[str]
     check: CheckView | None
 
@@ -210,6 +212,7 @@ def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
         seeds=sorted({seed_name(seed) for each in plan.frame.kinds for seed in _seeds(each)}),
         counted=plan.protocol.counter is not None,
         settled=any(each.message.settled for each in plan.messages),
+        restarts=plan.protocol.restarts,
         lasts=list(dict.fromkeys(view.ended.last for view in views.values() if view.ended)),
         check=_selectable(list(views.values())),
         makers=frozenset(check.view.maker for view in views.values() for check in view.checks),

@@ -17,12 +17,15 @@ _KINDS: Mapping[str, tuple[int, bool]] = {
     "unconfirmed_data.request": (4, True), "request_status.request": (9, True), "ack": (0, False),
     "nack": (1, False), "request_status.response": (11, False), "not_supported": (15, False),
 }  # fmt: skip
+#: Functions of a primary station whose frame count bit counts.
+_COUNTED = (2, 3)
 UNKNOWN: frozenset[str] = frozenset()
 
 
 def build(record: Record) -> bytes | None:
     function, primary = _KINDS[record["message"]]
-    control = ControlByte(record["from_master"], primary, record["count"], record["valid"], function)
+    count, valid = record.get("count", False), function in _COUNTED if primary else record["full"]
+    control = ControlByte(record["from_master"], primary, count, valid, function)
     data = bytes.fromhex(record["fields"].get("data", ""))
     ends = (record["node"], record["master"])
     destination, source = ends if primary else reversed(ends)
@@ -39,7 +42,6 @@ def read(wire: bytes, direction: Direction) -> Record | None:
         "node": header.destination if control.prm else header.source,
         "master": header.source if control.prm else header.destination,
         "from_master": control.dir_from_master,
-        "count": control.fcb,
-        "valid": control.fcv,
+        **({"count": control.fcb} if control.prm else {"full": control.fcv}),
         "fields": {"data": frame.user_data.hex()} if frame.user_data else {},
     }

@@ -34,20 +34,20 @@ class _Line:
 
 def build(record: Record) -> bytes | None:
     name, line, fields = record["message"], _Line(), record["fields"]
-    if name == "initialise.request" and record["node"] <= 250:
+    if name == "initialise.request" and record["node"] <= 250 and not record["fcb"]:
         meterbus.send_ping_frame(line, record["node"])
         return line.sent
     if name == "select.request":
         maker = fields["maker"].to_bytes(2, "little").hex()
         number = f"{fields['identity']:08}{maker}{fields['version']:02X}{fields['medium']:02X}"
         meterbus.send_select_frame(line, number.upper())
-        return _moved(line.sent, record["node"])
+        return _moved(line.sent, record["node"], record["fcb"])
     return bytes(meterbus.TelegramACK()) if name == "ack" else None
 
 
-def _moved(wire: bytes, node: int) -> bytes:
-    """The frame to another node, and without the counter bit, which it sets."""
-    body = bytes([wire[4] & ~0x20, node, *wire[6:-2]])
+def _moved(wire: bytes, node: int, count: int) -> bytes:
+    """The frame to another node, and with another frame count bit than the one that it sets."""
+    body = bytes([wire[4] & ~0x20 | count << 5, node, *wire[6:-2]])
     return wire[:4] + body + bytes([sum(body) & 0xFF]) + wire[-1:]
 
 
@@ -63,7 +63,7 @@ def read(wire: bytes, direction: Direction) -> Record | None:
     node, control = found.header.aField.parts[0], found.header.cField.parts[0]
     if isinstance(found, meterbus.TelegramShort):
         names = {0x40: "initialise.request", 0x5B: "read.request"}
-        return {"message": names[control], "node": node}
+        return {"message": names[control & ~0x20], "node": node, "fcb": control >> 5 & 1}
     kind = found.body.bodyHeader
     code = kind.ci_field.parts[0]
     name = {0x50: "reset.request", 0x51: "write.request", 0x52: "select.request", 0x72: "read.response"}[code]

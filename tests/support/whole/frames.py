@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from tests.support.whole import conditional, endings, header_texts, one_way, parties
+from tests.support.whole import bit_ways, conditional, endings, header_texts, one_way, parties
 from tests.support.whole.endings import Ending
 from tests.support.whole.mixed import Mixture
 from tests.support.whole.reference import checks
@@ -118,6 +118,8 @@ def choose(rng: random.Random, words: _Words) -> Shape:
     more = random.Random(repr(rng.getstate()))
     if "parts" in shape.frame:
         _conditions(more, shape, plain=kind == "ended" and "coding" not in shape.frame)
+        if shape.directed:
+            bit_ways.add(random.Random(f"{rng.getstate()} ways"), shape.frame["parts"])
         header_texts.add(random.Random(f"{rng.getstate()} texts"), shape.frame["parts"])
     _end(rng, more, shape, kind)
     for key in ("parts", "packet"):

@@ -9,7 +9,7 @@ from typing import Any
 
 from tests.support.whole.reference.fields import Fields, bits_of
 from tests.support.whole.reference.layouts import Message, Number, Run, Slot
-from tests.support.whole.reference.notation import Direction, Doc, octets, whole_span
+from tests.support.whole.reference.notation import Direction, Doc, as_doc, octets, of_way, whole_span
 
 
 def numbered(document: Doc, given: Any, direction: str) -> int:
@@ -18,13 +18,15 @@ def numbered(document: Doc, given: Any, direction: str) -> int:
     parts = document["frame"].get("parts", {})
     if not parts:
         return int(given)
-    pieces = [(name, each) for name, spec in parts.items() for each in bits_of(spec)]
+    own = {name: as_doc(of_way(spec, direction)) for name, spec in parts.items()}
+    pieces = [(name, each) for name, spec in own.items() for each in bits_of(spec)]
     for wanted in ("direction", "message"):
         for part, (inner, role, _, bits, spec) in pieces:
             if role == wanted:
                 name = inner or part
                 values = spec.get("values", {}).get(direction) if role == "direction" else given
-                value = values[name] if isinstance(values, dict) else values
+                alone = 0 if "if" in spec else values  # one that only one direction has may be left out
+                value = values.get(name, 0) if isinstance(values, dict) else alone
                 value = int.from_bytes(value.encode("ascii"), "big") if isinstance(value, str) else value
                 number = number << bits | value
     return number

@@ -24,7 +24,7 @@ from tests.support.whole.reference.layouts import (
     most_bytes,
     size_of,
 )
-from tests.support.whole.reference.notation import Doc, octets, part_doc, whole_span
+from tests.support.whole.reference.notation import Doc, octets, of_way, part_doc, whole_span
 from tests.support.whole.reference.parties import has_parties, told
 from tests.support.whole.reference.values import Raw, Wrong, get, holds, items_of, met, note, put
 from tests.support.whole.reference.values import check as check_range
@@ -200,9 +200,11 @@ class Frame:
         """Read the parts of the frames of a direction; "" if both have the same."""
         frame, order = document["frame"], document.get("byteorder", "big")
         fields = Fields(document, 0)
-        specs = {name: spec for name, spec in frame["parts"].items() if has(spec, direction)}
-        #: Some parts are only in the frames of one direction.
+        given = frame["parts"].items()
+        specs = {name: of_way(spec, direction) for name, spec in given if has(spec, direction)}
+        #: Some parts, or bits, are only in the frames of one direction.
         self.one_way = any(map(_directed, frame["parts"].values())) or has_parties(document)
+        self.one_way = self.one_way or any(of_way(spec, "request") != spec for _, spec in given)
         specs = {name: told(spec, direction, document) for name, spec in specs.items()}
         self.parts = [_among(part_of(name, spec, order, fields), specs) for name, spec in specs.items()]
         #: Tests of the values that decide whether a frame has a part, by its name.

@@ -168,6 +168,23 @@ def part_doc(given: object) -> Doc:
     return {"role": next((role for key, role in told.items() if key in given), "value"), **given}
 
 
+def of_way(given: object, direction: str) -> object:
+    """A part without the bits that only the frames of the other direction have; "" for all bits."""
+    if not isinstance(given, dict) or "bits" not in given or not direction:
+        return given
+    ways = ("", "request" if direction == "request" else "response")
+    return {**given, "bits": {name: each for name, each in given["bits"].items() if bits_way(each) in ways}}
+
+
+def bits_way(given: object) -> str:
+    """The direction whose frames have some bits, "" for both."""
+    tests = given.get("if", {}) if isinstance(given, dict) else {}
+    named = [each for each in tests.values() if isinstance(each, str)]
+    way = next((each for each in named if each.removeprefix("not ") in ("request", "response")), "")
+    other = {"not request": "response", "not response": "request"}
+    return other.get(way, way)
+
+
 def whole_or_negative(given: object) -> tuple[int, int]:
     """A range of integers."""
     first, last = span(given)
