@@ -69,7 +69,7 @@ def _number_or_word(value: object) -> object:
         raise ValueError(  # noqa: TRY004 - a wrong value of the file, not of a caller
             f"{shown(value)} is neither a whole number nor a word; quote a word"
         )
-    return value
+    return value if isinstance(value, str) else int(value)
 
 
 def _label(value: object) -> object:
@@ -77,7 +77,9 @@ def _label(value: object) -> object:
         raise ValueError(  # noqa: TRY004 - a wrong value of the file, not of a caller
             f"{shown(value)} is not a label; write a word, a whole number, true or false"
         )
-    return _uncontrolled(value) if isinstance(value, str) else value
+    if isinstance(value, bool):
+        return value
+    return _uncontrolled(value) if isinstance(value, str) else int(value)
 
 
 class ShortForm:
