@@ -6,8 +6,9 @@ import functools
 
 import jinja2
 
-from qlinkgen.backends.base import Outputs, environment
+from qlinkgen.backends.base import Outputs
 from qlinkgen.backends.c.header import Header
+from qlinkgen.backends.templates import environment
 from qlinkgen.model.naming import file_stem
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import Options, plan_of

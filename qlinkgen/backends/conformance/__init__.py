@@ -11,9 +11,10 @@ import functools
 
 import jinja2
 
-from qlinkgen.backends.base import Options, Outputs, environment
+from qlinkgen.backends.base import Options, Outputs
 from qlinkgen.backends.conformance.kit import Kit
 from qlinkgen.backends.conformance.sources import Header, Sources
+from qlinkgen.backends.templates import environment
 from qlinkgen.model.naming import file_stem
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import plan_of

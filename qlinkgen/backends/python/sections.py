@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import jinja2
 
 from qlinkgen.backends import python_text
-from qlinkgen.backends.base import environment
 from qlinkgen.backends.python.frame_views import PartsView
 from qlinkgen.backends.python.kinds import AnyView
 from qlinkgen.backends.python.ways import Ways, definitions, differing, merged
+from qlinkgen.backends.templates import environment
 from qlinkgen.model.message import Direction
 
 
