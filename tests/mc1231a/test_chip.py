@@ -228,7 +228,6 @@ def test_the_second_axis_has_no_electronic_gear(bench: Bench) -> None:
     bench.chip.turn_master(2, 100)
     assert bench.axis.actual == 0
     assert bench.do("get_mode").value == mode
-    assert bench.do("get_ratio").value == 0
 
 
 def test_an_electronic_gear_follows_its_master(bench: Bench) -> None:

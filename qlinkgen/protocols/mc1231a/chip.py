@@ -10,9 +10,10 @@ from collections.abc import Callable, Iterable
 from typing import Final
 
 from qlinkgen.codecs import mc1231a
-from qlinkgen.protocols.mc1231a.axis_commands import AXIS_COMMANDS, GEARING, Action
+from qlinkgen.protocols.mc1231a.axis_commands import AXIS_COMMANDS
 from qlinkgen.protocols.mc1231a.chip_axis import ChipAxis
 from qlinkgen.protocols.mc1231a.facts import AXES, check_axis
+from qlinkgen.protocols.mc1231a.trajectory import GEAR
 
 #: Seconds of one sample of the trajectories; set_smpl_time has no unit, so it is only kept.
 SAMPLE_TIME: Final = 0.0005
@@ -98,13 +99,7 @@ class ChipSet:
         if own is not None:
             return lambda request: own(*(getattr(request, field) for field in fields))
         action = AXIS_COMMANDS[name]
-        if name in GEARING:
-            return lambda request: self._gear(action, *(getattr(request, field) for field in fields))
         return lambda request: action(self._axis, *(getattr(request, field) for field in fields))
-
-    def _gear(self, action: Action, *values: float) -> float | None:
-        """Execute a command of the electronic gear of axis 1; axis 2, whose encoder leads it, has none."""
-        return action(self._axis, *values) if self.current == 1 else 0
 
     @property
     def _axis(self) -> ChipAxis:
@@ -117,6 +112,11 @@ class ChipSet:
     def _do_set_2(self) -> int:
         self.current = 2
         return self._axis.status
+
+    def _do_set_prfl_gear(self) -> None:
+        """Select the electronic gear of axis 1; axis 2, whose encoder leads it, has none."""
+        if self.current == 1:
+            self._axis.set_mode(GEAR)
 
     def _do_set_i(self) -> int:
         if self._interrupting is not None:
