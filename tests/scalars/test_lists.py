@@ -135,8 +135,10 @@ def test_members_in_c() -> None:
         ('{type: "u8[2]", default: 3}', "'3' is not a list; write a list, like [1, 2]"),
         ('{type: "bool[2]", range: 0..1}', "'range' has no effect on bool; remove it"),
         ('{type: "u8[2]", const: 1}', "'const' has no effect on an array; remove it"),
-        ('{type: "u8[2]", bits: {b: 0}}', "'bits' has no effect on an array; define a type with these bits, and "
-                                          "write an array of it"),
+        (
+            '{type: "u8[2]", bits: {b: 0}}',
+            "'bits' has no effect on an array; define a type with these bits, and write an array of it",
+        ),
     ],
 )  # fmt: skip
 def test_wrong_keys(field: str, text: str) -> None:
