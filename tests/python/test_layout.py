@@ -86,6 +86,18 @@ def test_other_protocols_leave_nothing_to_do(path: Path, tmp_path: Path) -> None
     assert ruff("format", "--check", folder=tmp_path) == ""
 
 
+def test_support_modules_leave_nothing_to_do(tmp_path: Path) -> None:
+    """All of them, also those that no schema here needs."""
+    modules = {
+        f"{name}/{path.name}": path.read_text("utf-8")
+        for name in ("construct", "python")
+        for path in (ROOT / "qlinkgen/backends" / name).glob("_[a-z]*.py")
+    }
+    assert place(tmp_path, modules) > 20
+    assert ruff("check", folder=tmp_path) == ""
+    assert ruff("format", "--check", folder=tmp_path) == ""
+
+
 _EQUAL_CASES = """\
 qlinkgen: 1
 protocol: {name: tank, title: Tank, revision: "1", source: Example, doc: A tank}

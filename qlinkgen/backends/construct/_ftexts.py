@@ -43,7 +43,8 @@ class Letters(Adapter):
 
     def _checked(self, text: bytes, path: str) -> bytes:
         if len(text) != self.size or not text.isascii() or {*text} & {*self.excluded}:
-            raise ValidationError(f"{text!r} is not {self.size} legal characters", path=path)
+            message = f"{text!r} is not {self.size} legal characters"
+            raise ValidationError(message, path=path)
         return text
 
     def _decode(self, obj: int, context: Container, path: str) -> str:

@@ -38,7 +38,10 @@ class UntilStopped(Many):
     __slots__ = ("next_within", "repeats", "stopped_by")
 
     def __init__(
-        self, stopped_by: str, repeats: tuple[str, ...], next_within: tuple[float, float] | None
+        self,
+        stopped_by: str,
+        repeats: tuple[str, ...],
+        next_within: tuple[float, float] | None,
     ) -> None:
         super().__init__()
         self.stopped_by = stopped_by
