@@ -252,11 +252,29 @@ def _inside(nodes: list[Node], indent: int, end: str = "", *, joined: bool = Tru
         return [line for item in items if item for line in _inside(item, indent, ",")]
     if any(_is(each, "lambda") for each in nodes):
         return _function(nodes, indent, end)
+    colon = next((at for at, each in enumerate(nodes) if _is(each, ":") and each.blank), None)
+    if colon is not None:
+        return _slice(nodes, colon, indent, end)
     pieces = _operands(nodes)
     if len(pieces) == 1:
         return _bracketed(nodes, indent, end)
     lines = [line for piece in pieces[:-1] for line in _inside(piece, indent)]
     return [*lines, *_inside(pieces[-1], indent, end)]
+
+
+def _slice(nodes: list[Node], colon: int, indent: int, end: str) -> list[str]:
+    """A slice: its bounds are split one by one, and the end of one shares a line with the next."""
+    after = colon + 1
+    # The first place after the colon where a line can end: what precedes it stays with the first bound.
+    places = (at for at in range(after, len(nodes)) if _has_content(nodes[at]) or nodes[at].blank)
+    cut = next((at for at in places if at > after or _has_content(nodes[at])), None)
+    if cut is None:
+        return _inside(nodes[:colon], indent, f" {_flat(nodes[colon:])}{end}")
+    shared, follows = f" {_flat(nodes[colon:cut])}", nodes[cut]
+    opening = " " * follows.blank + follows.opening if isinstance(follows, Group) else ""
+    *lines, last = _inside(nodes[:colon], indent, shared + opening)
+    start = Word(last.strip().removesuffix(opening), blank=False)
+    return [*lines, *_inside([start, *nodes[cut:]], indent, end)]
 
 
 def _function(nodes: list[Node], indent: int, end: str) -> list[str]:
