@@ -126,7 +126,9 @@ class FieldBuilder:
                             "bad-count", place, what, hint, needs=(place[:-1], (*path, count.run))
                         )
                     counters.setdefault(count.run, field.name)
-        fields = [replace(each, counted=_is_sized(each, fields, counters)) for each in fields]
+        roles = [each.type.role for each in fields if isinstance(each.type, Scalar)]
+        measured = {role.run for role in roles if isinstance(role, Count) and role.unit == "bytes"}
+        fields = [replace(each, counted=_is_sized(each, counters, measured)) for each in fields]
         return [_with_counter(field, counters.get(field.slot or field.name)) for field in fields]
 
     def _whole(self, fields: Sequence[Field], name: str, path: Path) -> Sequence[Field]:
@@ -296,13 +298,14 @@ class FieldBuilder:
         return replace(field, type=replace(kind, length=replace(kind.length, maximum=max(1, most))))
 
 
-def _is_sized(field: Field, fields: Sequence[Field], counters: Collection[str]) -> bool:
-    """Whether a count tells the bytes of a choice, or of records of variable size."""
+def _is_sized(field: Field, counters: Collection[str], measured: Collection[str]) -> bool:
+    """Whether a count tells the bytes of a choice, or of records of variable size.
+
+    ``counters`` has what any count tells, ``measured`` the fields whose bytes one tells.
+    """
     if field.slot:
         return field.slot in counters
-    roles = [each.type.role for each in fields if isinstance(each.type, Scalar)]
-    counts = [role for role in roles if isinstance(role, Count) and role.run == field.name]
-    return field.walked and any(each.unit == "bytes" for each in counts)
+    return field.walked and field.name in measured
 
 
 def _with_counter(field: Field, counter: str | None) -> Field:
