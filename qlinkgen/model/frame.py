@@ -303,8 +303,8 @@ class DelimitedFrame:
         return self.parts[0].constant
 
     @property
-    def turned(self) -> bool:
-        """Whether only the turn of a frame in its dialogue tells it: it is its payload."""
+    def is_payload(self) -> bool:
+        """Whether a frame is its payload: of several kinds, one that only its turn in a dialogue tells."""
         return len(self.parts) == 1 and self.parts[0].role == "payload"
 
     @property
@@ -516,7 +516,7 @@ class FrameKinds:
 
     def is_turned(self, number: int) -> bool:
         """Whether only its turn tells the message with an id."""
-        return all(each.frame.turned for each in self.carrying(number))
+        return all(each.frame.is_payload for each in self.carrying(number))
 
     @property
     def address(self) -> PartBits | None:

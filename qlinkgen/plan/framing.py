@@ -275,15 +275,13 @@ def frame_plans(frame: Frame) -> Mapping[Direction, FramePlan]:
 
 def _kinds(frame: FrameKinds) -> tuple[FramePlan, ...]:
     """Each kind has a plan of its own."""
-    return tuple(
-        replace(
-            _delimited(each.frame, "response"),
-            name=each.title,
-            base=frame.base(each.family),
-            only=each.only,
-        )
-        for each in frame.kinds
-    )
+    found: list[FramePlan] = []
+    for each in frame.kinds:
+        plan = _delimited(each.frame, "response")
+        end = ByTurn() if each.frame.is_payload else plan.end
+        base = frame.base(each.family)
+        found.append(replace(plan, end=end, name=each.title, base=base, only=each.only))
+    return tuple(found)
 
 
 def _several(kinds: tuple[FramePlan, ...]) -> FramePlan:
@@ -316,8 +314,6 @@ def _delimited(whole: DelimitedFrame, direction: Direction) -> FramePlan:
         end = ByTerminator(part, envelope.from_end(part) - part.size, stated.shared, frame.paired)
     if frame.ends_idle:
         end = BySilence()
-    if frame.turned:
-        end = ByTurn()
     return FramePlan(
         envelope=envelope,
         end=end,

@@ -75,7 +75,7 @@ def build_kinds(file: SchemaFile, builder: FrameBuilder, report: Reporter) -> Fr
             )
             for name, frame, way in ways
         ),
-        steps if any(frame.turned for _, frame, _ in built) else 0,
+        steps if any(frame.is_payload for _, frame, _ in built) else 0,
     )
     checker = _Checker(report)
     for name, frame, _ in built:
@@ -150,7 +150,7 @@ def check_used(file: SchemaFile, kinds: FrameKinds, messages: list[Message], rep
     for kind in kinds.kinds:
         carried = [each for each in messages if kind in kinds.carrying(each.id)]
         for message in carried:
-            if kind.frame.turned and message.name not in steps:
+            if kind.frame.is_payload and message.name not in steps:
                 what = f"{message.name} is not a step, and nothing but its turn tells a frame of {kind.name}"
                 hint = "let only steps have this kind, or begin it with a constant or the message id"
                 report.error(_RULE, ("frames", kind.name), what, hint, of_key=True)
@@ -165,7 +165,7 @@ def _check_asking(kinds: FrameKinds, kind: FrameKind, asking: list[Message], rep
         hint = "let only responses and replies have this kind, or give it the address"
         report.error(_RULE, path, what, hint, of_key=True)
     size = sum(part.size for part in kind.frame.parts) + kind.frame.payload.max_size
-    proven = kind.frame.part("checksum") or kind.frame.complemented or kind.frame.turned
+    proven = kind.frame.part("checksum") or kind.frame.complemented or kind.frame.is_payload
     for message in asking if size <= _SHORT and not proven else ():
         counted = f"{size} byte{'s' if size > 1 else ''}"
         what = f"{message.name} is not an answer, and its frame of {counted} has no check value"
@@ -204,7 +204,7 @@ class _Checker:
             if frame.part("terminator"):
                 what = f"{name} begins with its message id and ends with a terminator"
                 self._error((*path, first), what, "begin it with a constant, or give it a length")
-        elif not frame.preamble and not frame.turned:
+        elif not frame.preamble and not frame.is_payload:
             what = f"{name} begins with {first}, not with constant bytes"
             hint = "begin each kind with a constant that tells it from the others, or with the message id"
             self._error((*path, first), what, hint)

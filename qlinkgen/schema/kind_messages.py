@@ -41,7 +41,9 @@ class KindMessages:
         for family in sorted({each.family for each in kinds.kinds}):
             frame = family_frame(kinds, family)
             fields = FieldBuilder(file, report, types, frame.payload.max_size)
-            builder = MessageBuilder(file, report, fields, frame, bus, base=kinds.base(family))
+            builder = MessageBuilder(
+                file, report, fields, frame, bus, base=kinds.base(family), turned=frame.is_payload
+            )
             builder.places, builder.id_places = self.places, self.id_places
             self._builders[family] = builder
 

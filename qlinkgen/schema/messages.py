@@ -70,10 +70,12 @@ class MessageBuilder:
         bus: Bus,
         *,
         base: int = 0,
+        turned: bool = False,
     ) -> None:
         """``frame`` is None if it could not be built; checks that depend on it are skipped.
 
-        ``base`` is added to the numbers of messages, see `FrameKinds`.
+        ``base`` is added to the numbers of messages, see `FrameKinds`. If ``turned``, only its turn in a
+        dialogue tells a message.
         """
         self._base = base
         self._file = file
@@ -86,8 +88,8 @@ class MessageBuilder:
         self.places: dict[str, Path] = {}
         self.id_places: dict[str, Path] = {}
         self._ids = IdBuilder(report, frame)
-        #: Numbers of messages that only their turn tells.
-        self._turned = itertools.count()
+        #: Numbers of messages that only their turn tells, None for others.
+        self._turns = itertools.count() if turned else None
         self.asked = AskedBuilder(file, report, fields, frame)
 
     @property
@@ -204,9 +206,9 @@ class MessageBuilder:
         usual = path in (("commands", command, "id"), ("messages", name, "id"))
         stated = StatedId(None) if layout.inherited and not self._ids.identifies else layout.number
         whose = "" if usual else name
-        if isinstance(self._frame, DelimitedFrame) and self._frame.turned:
+        if self._turns is not None:
             self._ids.number(stated, direction, path, whose)
-            return self._base + next(self._turned)
+            return self._base + next(self._turns)
         return self._base + self._ids.number(stated, direction, path, whose, way=layout.way)
 
     def _settled(self, layout: Written, direction: Direction) -> tuple[tuple[str, int], ...]:
@@ -356,7 +358,7 @@ class MessageBuilder:
         """Check that the fields determine the end of a frame without a length or terminator."""
         if isinstance(self._frame, DelimitedFrame) and self._frame.tells_end:
             return
-        turned = isinstance(self._frame, DelimitedFrame) and self._frame.turned
+        turned = self._turns is not None
         if turned and not message.min_size:
             what = f"{message.name} may have no byte, so it is over before it begins"
             self._error("no-frame-end", path, what, "give it at least one byte")

@@ -9,7 +9,7 @@ import pytest
 
 from qlinkgen.model.integer import Chunk
 from qlinkgen.plan import plan_of
-from qlinkgen.plan.ends import Hunt, Rescan
+from qlinkgen.plan.ends import ByMessage, Hunt, Rescan
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import MarkPart
 from qlinkgen.plan.transparency import FrameStuffing
@@ -103,6 +103,19 @@ def test_a_length_later_in_the_frame_is_searched_for() -> None:
     parts = {name: _PARTS[name] for name in ("start", "id", "size", "node", "data", "check")}
     parts["check"] = parts["check"].replace("size, id", "id, size")
     assert isinstance(_frame(parts).receiver, Rescan)
+
+
+def test_the_only_kind_of_frame_is_looked_for_though_it_is_its_payload() -> None:
+    text = (
+        'qlinkgen: 1\nprotocol: {name: plain, revision: "1", source: test}\nbyteorder: big\n'
+        "frame: {parts: {data: {role: payload, size: 0..9}}}\nbus: {kind: master_slave}\n"
+        "messages: {state: {fields: {a: u8, b: u16}}}\n"
+    )
+    protocol, faults = loads(text, "plain.yaml")
+    assert protocol, faults
+    plan = plan_of(protocol)
+    assert plan.frame.end == ByMessage()
+    assert not any(each.turned for each in plan.messages)
 
 
 @pytest.mark.parametrize(
