@@ -90,6 +90,11 @@ class FieldMaker:
         """What arrays may have as records of fixed size."""
         return {**self.records, **self.bitty}
 
+    @property
+    def _counts_size(self) -> int:
+        """The size of two counts of sixteen bits."""
+        return 2 * self._bytes_of("u16", {})
+
     def types(self) -> Doc:
         """Enums, flags and named types."""
         rng = self.rng
@@ -169,7 +174,8 @@ class FieldMaker:
                 continue
             made[name] = spec
             size += more
-            has_value = has_value or not (isinstance(spec, dict) and {"const", "reserved"} & spec.keys())
+            whole = self._merged(spec if isinstance(spec, dict) else {"type": spec})
+            has_value = has_value or not {"const", "reserved"} & whole.keys()
         if has_value:
             if not self.shape.groups and self.shape.word <= 1 and self.rng.random() < self.filled:
                 listed = list(made.items())
@@ -291,7 +297,7 @@ class FieldMaker:
             return
         # Some messages can be longer than the frame allows.
         size = rng.choice((record.size, record.size, max(1, record.size // 4)))
-        most = min(rng.choice((1, 2, 3, 8)), (room.left - room.least - 4) // size)
+        most = min(rng.choice((1, 2, 3, 8)), (room.left - room.least - self._counts_size) // size)
         if most < 1:
             return
         roll = rng.random()
@@ -399,6 +405,7 @@ class FieldMaker:
             made.append((self.words.name(taken), "u8"))
         if self.shape.word > 1:
             self._fill_words(made, taken)
+            self._add_words(made, taken)
         if not fixed and not room.least and self.rng.random() < self.conditional:
             self._add_conditions(made, set(begun or {}), taken)
         self._offset_counts(made)
@@ -813,6 +820,13 @@ class FieldMaker:
         while size % self.shape.word:
             size -= self._packet_size(made.pop()[1])
 
+    def _add_words(self, made: list[tuple[str, Any]], taken: set[str]) -> None:
+        """Whole words at the end, of any number, if a length tells it."""
+        left = (self.shape.most - sum(self._packet_size(spec) for _, spec in made)) // self.shape.word
+        if self.shape.has_length and self.shape.word == 2 and left > 0 and self.rng.random() < self.variable:
+            kind = self.rng.choice(("u16", "i16", "f16"))
+            made.append((self.words.name(taken), f"{kind}[0..{self.rng.choice((1, left))}]"))
+
     def _packet_size(self, spec: Any) -> int:
         written: Doc = {"type": spec} if isinstance(spec, str) else spec
         base, _, count = written["type"].partition("[")
@@ -832,7 +846,9 @@ class FieldMaker:
                 }
             )
         base = self.enums.get(base, self.flags.get(base, {"type": base}))["type"]
-        if base in ("bool", "bytes", "text"):
+        if "[" in written.get("as", ""):
+            size = int(written["as"].partition("[")[2].rstrip("]"))
+        elif base in ("bool", "bytes", "text"):
             size = 1
         elif "fixed" in base:
             size = sum(map(int, base.lstrip("u").removeprefix("fixed").split("."))) // 8
@@ -1188,7 +1204,7 @@ class FieldMaker:
             self._terminated(name, made, room)
             return
         kind, spec, step = self._variable_kind()
-        most = min(rng.choice((1, 3, 8, 40, 250)), (room.left - room.least - 4) // step)
+        most = min(rng.choice((1, 3, 8, 40, 250)), (room.left - room.least - self._counts_size) // step)
         if most < 1:
             return
         low = rng.choice((0, 0, 0, 1, most))

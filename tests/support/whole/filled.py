@@ -39,7 +39,9 @@ def add_filled(
         start = rng.randint(first, place - 1)
         spec, size = _filled(rng, made, start, place)
         if size <= room:
-            made.insert(place, (name(), spec))
+            added = name()
+            made.insert(place, (added, spec))
+            _cover(made, place, added)
             room -= size
 
 
@@ -58,6 +60,15 @@ def _filled(rng: random.Random, made: Sequence[Field], start: int, place: int) -
     over = [each for each, _ in made[start:end]]
     init = {"init": rng.choice((0, 1, (1 << bits) - 1))} if rng.random() < 0.2 else {}
     return {"type": f"u{bits}", **order, "algorithm": algorithm, **init, "over": over}, bits // 8
+
+
+def _cover(made: Sequence[Field], place: int, added: str) -> None:
+    """Let check values over fields around a new one cover it too."""
+    names = [each for each, _ in made]
+    for _, spec in made[place + 1 :]:
+        over = spec.get("over") if isinstance(spec, dict) else None
+        if over and names.index(over[0]) < place < names.index(over[-1]):
+            over[:] = names[names.index(over[0]) : names.index(over[-1]) + 1]
 
 
 def _is_plain(spec: Any) -> bool:

@@ -43,7 +43,7 @@ class Shape:
     groups: Doc = field(default_factory=dict)
     #: Text does not use the marker bit.
     text: bool = True
-    #: Size of the words of payloads, whose fields then have a fixed size.
+    #: Size of the words of payloads, or of the steps of their length; most of their fields have a fixed size.
     word: int = 0
     #: Zeros at the end of payloads are not sent; their fields have a fixed size.
     trimmed: bool = False
@@ -65,7 +65,8 @@ class Shape:
     @property
     def shares(self) -> bool:
         """Whether only their request may tell answers apart: of any size, with the same attributes."""
-        return self.kind == "parts" and self.has_length and not self.trimmed and not self.seeds
+        plain = not self.trimmed and not self.seeds and self.word <= 1
+        return self.kind == "parts" and self.has_length and plain
 
     @property
     def attributes(self) -> set[str]:
@@ -122,6 +123,7 @@ def choose(rng: random.Random, words: _Words) -> Shape:
             bit_ways.add(random.Random(f"{rng.getstate()} ways"), shape.frame["parts"])
         header_texts.add(random.Random(f"{rng.getstate()} texts"), shape.frame["parts"])
     _end(rng, more, shape, kind)
+    _count_steps(shape)
     for key in ("parts", "packet"):
         parts: Doc = shape.frame.get(key, {})
         for name, spec in parts.items():
@@ -141,6 +143,18 @@ def _end(rng: random.Random, more: random.Random, shape: Shape, kind: str) -> No
         endings.openly(more, shape.frame)
     if "stuffing" in shape.frame and more.random() < 0.3:
         endings.as_coding(shape.frame)
+
+
+def _count_steps(shape: Shape) -> None:
+    """Let payloads have whole steps of the length, or the length count bytes if its other parts have not."""
+    parts: Doc = shape.frame.get("parts", {})
+    for spec in parts.values():
+        if "counts" in spec and "scale" in spec:
+            counted = [spec["counts"]] if isinstance(spec["counts"], str) else spec["counts"]
+            if sum(_size(parts[name]) for name in counted) % spec["scale"]:
+                del spec["scale"]
+            else:
+                shape.word = spec["scale"]
 
 
 def _codes(frame: Doc) -> bool:
@@ -517,6 +531,8 @@ class _Parts:
         if "length" in names:
             most = self._longest(names, stuffing, most, below=strict)
         parts[names["payload"]]["size"] = f"{least}..{most}"
+        for spec in parts.values() if least else ():
+            spec.pop("otherwise", None)
         if (trimmed := "trim" in parts[names["payload"]]) and (least or self._chance(0.5)):
             parts[names["payload"]]["trim"] = {"zeros": True, "keep": max(least, rng.choice((0, 1, 1, 2, 9)))}
         address = parts.get(names.get("address", ""), {})
@@ -557,6 +573,8 @@ def _size(part: Doc) -> int:
         return 0
     if "value" in part:
         return len(bytes.fromhex(part["value"]))
+    if "as" in part:
+        return int(part["as"][4:-1])
     return len(part["sent"]) if "sent" in part else bits_of_type(part["type"]) // 8
 
 

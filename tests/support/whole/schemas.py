@@ -154,7 +154,8 @@ class _Maker:
                 spec["response"] = rng.choice(sent)
                 continue
             family = rng.choice([each for each in several.families if not each.ended])
-            if family.name and family.shape.id_bits and rng.random() < 0.5:
+            texts = "separator" in spec
+            if family.name and family.shape.id_bits and not texts and rng.random() < 0.5:
                 self._ids = family.ids
                 fields = replace(maker, shape=family.shape).fields(Room.of(family.shape))
                 spec["response"] = {"frame": family.name, **self._identified(family.shape), "fields": fields}
@@ -394,6 +395,7 @@ class _Maker:
         if any("receive" in step for step in steps):
             command["steps"] = steps
             varies = shape.has_length and not shape.trimmed and not shape.least and not shape.groups
+            varies = varies and shape.word <= 1
             if varies and shape.most > 8 and "separator" not in command:
                 self._size_from_step(steps)
         elif "response" not in command:
@@ -444,7 +446,9 @@ class _Maker:
             return
         found["defaults"] = {"response": {"id": number}}
         if self.rng.random() < 0.4:
-            reply = self._reply(shape, maker, number)
+            reply = self._reply(replace(shape, most=shape.most - 1), maker, number)
+            if any(isinstance(each, dict) and "optional" in each for each in reply["fields"].values()):
+                return
             # A byte at its end tells it from answers without one, by its size or by its number.
             reply["fields"]["told"] = {"type": "u8", "const": self.rng.choice((0, 1, 0xA5))}
             self.rng.choice(answered)["replies"] = {self.words.name(taken): reply}
@@ -469,14 +473,14 @@ class _Maker:
             lists = [name for name, spec in command["request"].items() if _lists(spec)]
             if lists and shape.address_bits and rng.random() < 0.5:
                 command["many"] = {"each": f"request.{rng.choice(lists)}"}
-        varies = shape.has_length and not shape.trimmed and not shape.least
+        varies = shape.has_length and not shape.trimmed and not shape.least and shape.word <= 1
         if varies and shape.most > 8 and rng.random() < 0.8:
             self._size_from_request(command, rows=not shape.groups)
 
     def _size_from_request(self, command: Doc, *, rows: bool) -> None:
         """Let a field of the request say how many items the response has."""
         request, rng = command["request"], self.rng
-        plain = [name for name, spec in request.items() if re.fullmatch(r"[ui]\d+", str(spec))]
+        plain = [name for name, spec in request.items() if re.fullmatch(r"[ui](?!1$)\d+", str(spec))]
         if plain and "empty_request" not in command:
             name, kind = rng.choice(plain), rng.choice(("u8", "i16", "bytes", "text"))
             unsigned = request[name].replace("i", "u")
@@ -651,6 +655,7 @@ def _stop_answers(rng: random.Random, document: Doc) -> None:
     commands: Doc = document.get("commands", {})
     if (
         document["bus"]["kind"] not in {"master_slave", "link"}
+        or "packet" in document.get("frame", {})
         or "defaults" in document
         or rng.random() < 0.5
     ):
