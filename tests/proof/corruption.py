@@ -22,11 +22,13 @@ class Stream:
     Attributes:
         data: the bytes.
         intact: the complete frames, in order.
+        offsets: where each of them begins.
         pieces: the bytes of each frame, and those between frames, as a line with silences has them.
     """
 
     data: bytes
     intact: Sequence[bytes]
+    offsets: Sequence[int]
     pieces: Sequence[bytes]
 
     def chunks(self) -> Iterator[bytes]:
@@ -42,17 +44,19 @@ def corrupted(frames: Sequence[bytes], kind: str, look_alike: LookAlike) -> Stre
     """A stream of frames with one kind of corruption, a mixture of all, or none."""
     chance = random.Random(kind)
     pieces: list[bytes] = []
-    intact = []
+    intact, offsets, end = [], [], 0
     for frame in frames:
         if chance.randrange(_ONE_IN):
             arrived = [frame]
         else:
             chosen = chance.choice(KINDS) if kind == "all" else kind
             arrived = [_between(chosen, chance, look_alike), _inside(chosen, frame, chance)]
+        end += sum(map(len, arrived))
         if b"".join(arrived).endswith(frame):
             intact.append(frame)
+            offsets.append(end - len(frame))
         pieces += arrived
-    return Stream(b"".join(pieces), intact, pieces)
+    return Stream(b"".join(pieces), intact, offsets, pieces)
 
 
 def _inside(kind: str, frame: bytes, chance: random.Random) -> bytes:

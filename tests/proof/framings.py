@@ -13,7 +13,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from qlinkgen.backends import python
-from qlinkgen.plan import plan_of
+from qlinkgen.model.message import Direction
+from qlinkgen.plan import Plan, plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.ended import frame_reader
+from qlinkgen.plan.ends import Rescan
+from qlinkgen.plan.reading import BadFrame, FrameReader, Incomplete, KindsReader, NoFrame
+from qlinkgen.plan.receive import receiver
 from qlinkgen.schema import find, library, load, loads
 from tests.proof.corruption import EVERY_KIND
 from tests.proof.recovery import Result, Subject
@@ -108,7 +114,7 @@ def library_subject(name: str) -> Subject:
     """Distinct frames of a protocol of the library, in the direction that most messages have."""
     protocol = load(find(name))
     plan, module, chance = plan_of(protocol), python.load(protocol), random.Random(name)
-    direction = max(plan.received_directions, key=lambda each: len(plan.received(each)))
+    direction = _direction(plan)
     messages = [protocol.by_name[each.name] for each in plan.received(direction)]
     frames = list(dict.fromkeys(random_frame(plan, chance.choice(messages), chance) for _ in range(FRAMES)))
     arguments = () if direction == "message" else (direction,)
@@ -121,6 +127,11 @@ def library_subject(name: str) -> Subject:
     return Subject(frames, lambda each: frames[0][: each.randint(1, 4)], decoded)
 
 
+def _direction(plan: Plan) -> Direction:
+    """The direction that most messages have."""
+    return max(plan.received_directions, key=lambda each: len(plan.received(each)))
+
+
 def total(name: str) -> Result:
     """The sum of the results for every kind of corruption."""
     found = library_subject(name) if name in LIBRARY else subject(name)
@@ -128,6 +139,45 @@ def total(name: str) -> Result:
     return Result(
         *(sum(getattr(each, key) for each in results) for key in ("intact", "recovered", "strange"))
     )
+
+
+def unexplained(subject: Subject, plan: Plan) -> Mapping[str, Sequence[int]]:
+    """Where intact frames begin that are lost without a reason, by kind of corruption.
+
+    The only reason is a false frame which the reference receiver finds over their beginning: its check values
+    are right by chance, or its loss is after them.
+    """
+    found = {}
+    for kind in EVERY_KIND:
+        lost = subject.lost(kind)
+        false = _right(plan, subject.stream(kind).data) if lost else ()
+        if rest := [at for at in lost if not any(each.start < at < each.stop for each in false)]:
+            found[kind] = rest
+    return found
+
+
+def _right(plan: Plan, stream: bytes) -> Sequence[range]:
+    """Where the reference receiver finds frames with right check values in a stream."""
+    direction = _direction(plan)
+    reader = frame_reader(plan.frames[direction], plan.known(direction))
+    return [
+        range(event.offset, event.offset + len(event.raw))
+        for event in receiver(plan, direction).run(stream)
+        if event.kind == "message" or _is_right(plan, direction, reader, event.raw)
+    ]
+
+
+def _is_right(plan: Plan, direction: Direction, reader: FrameReader | KindsReader, raw: bytes) -> bool:
+    """Whether the check values of a frame with a fault are right."""
+    try:
+        taken = reader.read(raw)
+        Codec(plan).judge(taken, direction)
+    except (Incomplete, NoFrame):
+        return False
+    except BadFrame as bad:
+        way = plan.frame.receiver
+        return isinstance(way, Rescan) and way.proves(bad.kind, inside=bool(bad.field))
+    return True
 
 
 def row(name: str) -> str:

@@ -52,13 +52,27 @@ class Subject:
         """The frames under one kind of corruption."""
         return corrupted(self.frames, kind, self.look_alike)
 
-    @functools.lru_cache  # noqa: B019  # there are three subjects, and a result takes a while
+    @functools.lru_cache  # noqa: B019  # there are few subjects, and a result takes a while
+    def delivered(self, kind: str) -> Counter[bytes]:
+        """The frames that the decoder delivers from a stream."""
+        stream = self.stream(kind)
+        return Counter(self.decoded(stream.pieces if self.silent else stream.chunks()))
+
+    def lost(self, kind: str) -> Sequence[int]:
+        """Where the intact frames of a stream begin that are not delivered."""
+        stream, left = self.stream(kind), self.delivered(kind).copy()
+        found = []
+        for frame, offset in zip(stream.intact, stream.offsets, strict=True):
+            left[frame] -= 1
+            if left[frame] < 0:
+                found.append(offset)
+        return found
+
     def result(self, kind: str) -> Result:
         """The result of the decoder."""
-        stream = self.stream(kind)
-        delivered = Counter(self.decoded(stream.pieces if self.silent else stream.chunks()))
-        recovered = sum((delivered & Counter(stream.intact)).values())
-        return Result(len(stream.intact), recovered, sum((delivered - Counter(self.frames)).values()))
+        intact = len(self.stream(kind).intact)
+        strange = sum((self.delivered(kind) - Counter(self.frames)).values())
+        return Result(intact, intact - len(self.lost(kind)), strange)
 
 
 @functools.cache

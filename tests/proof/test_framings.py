@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -33,13 +34,27 @@ UNCHECKED = {"slip": 0.8, "stm32": 0.95, "visca": 0.8}
 def test_every_intact_frame_of_the_library_is_delivered(name: str) -> None:
     """But for those that a false frame takes along: its check value is right by chance, or before a loss."""
     found = framings.total(name)
-    every = plan_of(load(find(name))).frame.every
-    kinds = [kind.envelope.checks for kind in every]
+    plan = plan_of(load(find(name)))
+    kinds = [kind.envelope for kind in plan.frame.every]
     # Kinds of one constant, such as the acknowledgement of M-Bus, have nothing to check.
-    bits = min((sum(8 * part.size for part in checks) for checks in kinds if checks), default=0)
-    signed = any(kind.envelope.after for kind in every)
-    share = 0.98 if signed else 1 if bits > 8 else 0.99 if bits else UNCHECKED[name]
-    assert found.recovered >= share * found.intact
+    # Digits double the bytes of a check value, not its bits.
+    bits = min(
+        (sum(part.check.mask.bit_length() for part in each.checks) for each in kinds if each.checks),
+        default=0,
+    )
+    if not bits:
+        assert found.recovered >= UNCHECKED[name] * found.intact
+        return
+    if bits > 8 and not any(each.after for each in kinds):
+        assert found.recovered == found.intact
+    assert not framings.unexplained(framings.library_subject(name), plan)
+
+
+def test_a_frame_that_a_receiver_drops_is_not_explained() -> None:
+    whole = framings.library_subject("nmea_0183")
+    careless = replace(whole, decoded=lambda chunks: whole.decoded(chunks)[1:])
+    lost = framings.unexplained(careless, plan_of(load(find("nmea_0183"))))
+    assert {kind: len(each) for kind, each in lost.items()} == dict.fromkeys(EVERY_KIND, 1)
 
 
 def test_the_page_has_every_protocol_of_the_library() -> None:
