@@ -98,14 +98,18 @@ class _Vectors:
         return next(found, b"")
 
     def faults(self, messages: Iterable[Mapping[str, Good]]) -> Iterator[Mapping[str, Json]]:
-        """The wrong frames; those of all messages only for the first of each direction and kind of frame."""
+        """The wrong frames; those of all messages only for the first of each direction and shape of frame.
+
+        A shape is a kind of frame, and which of the parts with conditions are not sent.
+        """
         faults = Faults(self._codec, self._kept)
-        begun: set[tuple[Direction, str]] = set()
+        begun: set[tuple[Direction, str, tuple[str, ...]]] = set()
         for good in messages:
             if good["defaults"].message.asked and not self._codec.plan.is_first(good["defaults"].message):
                 continue  # wrong ones may be other answers
-            for one in {each.frame.name: each for each in reversed([*good.values()])}.values():
-                place = one.message.direction, one.frame.name
+            shapes = {(each.frame.name, faults.absent(each)): each for each in reversed([*good.values()])}
+            for shape, one in shapes.items():
+                place = one.message.direction, *shape
                 yield from (bad.entry() for bad in faults.of(one, first=place not in begun))
                 begun.add(place)
 

@@ -8,7 +8,7 @@ not become a vector.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
@@ -126,6 +126,11 @@ class Faults:
                 yield Bad(kind, part, what, wire, good)
             seen.add(wire)
 
+    def absent(self, good: Good) -> tuple[str, ...]:
+        """The names of the parts that a frame does not have as their condition does not hold."""
+        sent = _Frame(self._codec, good).parts
+        return tuple(part.name for part in good.message.envelope_in(good.frame).parts if part not in sent)
+
     def _kind(self, good: Good, wire: bytes) -> str:
         """The kind of a fault; "" if there is none, or another one where only some messages are known."""
         kind = _judged(self._codec, good, wire)
@@ -150,11 +155,14 @@ class _Frame:
         self._envelope, self._transparency = good.message.envelope_in(good.frame), good.frame.transparency
         self._cells = self._made(good.payload)
 
+    @property
+    def parts(self) -> Sequence[Part]:
+        """The parts that the frame has."""
+        return [part for part in self._envelope.parts if not self._envelope.absent(part, self._cells)]
+
     def changes(self, *, first: bool) -> Iterator[tuple[str, str, bytes]]:
         """All changes to try: name of the part, error, frame."""
-        for part in self._envelope.parts:
-            if self._envelope.absent(part, self._cells):
-                continue
+        for part in self.parts:
             if first or not isinstance(part, ConstantPart | LengthPart | IdPart | CellPart | EqualPart):
                 for what, cells in self._changed(part):
                     yield part.name, what, self._joined(self._derived({**self._cells, **cells}, part))
@@ -163,7 +171,7 @@ class _Frame:
         for size in _cuts(len(wire)) if first else (len(wire) - 1,):
             yield self._part_at(self._cells, wire, size), f"it ends after {size} bytes", wire[:size]
         if first:
-            yield self._envelope.parts[-1].name, "a byte follows the frame", wire + b"\1"
+            yield self.parts[-1].name, "a byte follows the frame", wire + b"\1"
 
     def _made(self, payload: bytes) -> dict[str, bytes]:
         good = self._good
@@ -355,7 +363,7 @@ class _Frame:
                 at -= len(cells[part.name]) if part.name in cells else part.size
             if at < 0:
                 return part.name
-        return self._envelope.parts[-1].name
+        return self.parts[-1].name
 
 
 def _lone(rule: Insertion, sent: bytes, places: Iterable[int]) -> Iterable[int]:
