@@ -292,7 +292,8 @@ def _packed_records(step: RecordsStep, value: object) -> bytes:
 
 def _ends(step: RecordsStep, records: Sequence[Mapping[str, Raw]]) -> bool:
     """Whether the last record, and no other, ends the array."""
-    whole = [defaults(step.record.payload) | dict(each) for each in records]
+    usual = defaults(step.record.payload)
+    whole = [usual | dict(each) for each in records]
     return [step.ends(each) for each in whole] == [*[False] * (len(whole) - 1), True]
 
 

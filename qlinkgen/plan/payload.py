@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import groupby
 from typing import Literal, assert_never
 
@@ -560,7 +561,7 @@ class PayloadPlan:
         """Whether the size is constant."""
         return not self.size.terms and not self.walked
 
-    @property
+    @cached_property
     def runs(self) -> tuple[RunStep, ...]:
         """Runs of variable size, in wire order."""
         return tuple(
@@ -611,7 +612,7 @@ class PayloadPlan:
                 found |= {each.name: each for each in inner}
         return tuple(found.values())
 
-    @property
+    @cached_property
     def settable(self) -> tuple[Holder, ...]:
         """Steps and members with a value of the message, in wire order."""
         return holders(self.steps)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Mapping
 from typing import assert_never
 
@@ -175,9 +176,8 @@ def _fitting_frame(plan: PayloadPlan, values: dict[str, Raw]) -> dict[str, Raw]:
     for step in reversed([segment.records for segment in plan.segments if segment.records]):
         records = values[step.name]
         if isinstance(step, RecordsStep) and isinstance(records, list):
-            while len(records) > step.length.minimum and _is_too_long(plan, values):
-                records = records[1:] if step.last else records[:-1]
-                values = {**values, step.name: records}
+            records = _fewer(plan, step, records, values)
+            values = {**values, step.name: records}
             if _is_too_long(plan, values):
                 values = {**values, step.name: [defaults(step.record.payload) for _ in records]}
         elif isinstance(step, RecordStep) and records is not None and _is_too_long(plan, values):
@@ -188,6 +188,24 @@ def _fitting_frame(plan: PayloadPlan, values: dict[str, Raw]) -> dict[str, Raw]:
         if run not in walked and isinstance(given, bytes | list) and _is_too_long(plan, values):
             values = {**values, run.name: given[: run.length.minimum]}
     return values
+
+
+#: The records of an array; a case of a choice may be one of numbers.
+_Several = list[int] | list[Mapping[str, Raw]]
+
+
+def _fewer(plan: PayloadPlan, step: RecordsStep, records: _Several, values: Mapping[str, Raw]) -> _Several:
+    """As many of the records as a frame with these values can hold, at least their minimum."""
+
+    def some(count: int) -> _Several:
+        return records[-count:] if step.last and count else records[:count]
+
+    # Each trial packs the whole payload, so the number is found by halves.
+    counts = range(min(step.length.minimum, len(records)), len(records) + 1)
+    fitting = bisect_left(
+        counts, 1, key=lambda count: int(_is_too_long(plan, {**values, step.name: some(count)}))
+    )
+    return some(counts[max(0, fitting - 1)])
 
 
 def _is_too_long(plan: PayloadPlan, values: Mapping[str, Raw]) -> bool:
