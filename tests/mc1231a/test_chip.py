@@ -219,17 +219,6 @@ def test_positions_wrap(bench: Bench) -> None:
     assert -1073741824 <= bench.axis.actual < -1073741600
 
 
-def test_the_second_axis_has_no_electronic_gear(bench: Bench) -> None:
-    bench.do("set_2")
-    mode = bench.do("get_mode").value
-    bench.do("set_prfl_gear")
-    bench.do("set_ratio", value=-0.5)
-    bench.do("update")
-    bench.chip.turn_master(2, 100)
-    assert bench.axis.actual == 0
-    assert bench.do("get_mode").value == mode
-
-
 def test_an_electronic_gear_follows_its_master(bench: Bench) -> None:
     bench.do("set_prfl_gear")
     bench.do("set_ratio", value=-0.5)

@@ -8,7 +8,7 @@ from typing import Final
 
 from qlinkgen.protocols.mc1231a.chip_axis import ChipAxis
 from qlinkgen.protocols.mc1231a.registers import BUFFERED, IMMEDIATE, READABLE
-from qlinkgen.protocols.mc1231a.trajectory import S_CURVE, TRAPEZOIDAL, VELOCITY
+from qlinkgen.protocols.mc1231a.trajectory import GEAR, S_CURVE, TRAPEZOIDAL, VELOCITY
 
 Action = Callable[..., float | None]
 
@@ -33,7 +33,7 @@ def _waits(action: str) -> Action:
     return lambda axis: axis.pending.add(action)
 
 
-_PROFILES = {"trap": TRAPEZOIDAL, "vel": VELOCITY, "s_crv": S_CURVE}  # set_prfl_gear is of axis 1 alone
+_PROFILES = {"trap": TRAPEZOIDAL, "vel": VELOCITY, "s_crv": S_CURVE, "gear": GEAR}
 _BREAKPOINTS = ("time", "pos", "neg", "actl_pos", "actl_neg", "mtn_cmplt", "ext")
 
 AXIS_COMMANDS: Final[dict[str, Action]] = {

@@ -13,7 +13,6 @@ from qlinkgen.codecs import mc1231a
 from qlinkgen.protocols.mc1231a.axis_commands import AXIS_COMMANDS
 from qlinkgen.protocols.mc1231a.chip_axis import ChipAxis
 from qlinkgen.protocols.mc1231a.facts import AXES, check_axis
-from qlinkgen.protocols.mc1231a.trajectory import GEAR
 
 #: Seconds of one sample of the trajectories; set_smpl_time has no unit, so it is only kept.
 SAMPLE_TIME: Final = 0.0005
@@ -112,11 +111,6 @@ class ChipSet:
     def _do_set_2(self) -> int:
         self.current = 2
         return self._axis.status
-
-    def _do_set_prfl_gear(self) -> None:
-        """Select the electronic gear of axis 1; axis 2, whose encoder leads it, has none."""
-        if self.current == 1:
-            self._axis.set_mode(GEAR)
 
     def _do_set_i(self) -> int:
         if self._interrupting is not None:
