@@ -120,6 +120,22 @@ class Many(Protocol):
         ...
 
 
+class EachOf(Many, Protocol):
+    """Each node in a list of the request sends an answer."""
+
+    each: str
+    key: str
+    by: str
+
+
+class UntilStopped(Many, Protocol):
+    """Answers come until another command stops them."""
+
+    stopped_by: str
+    repeats: tuple[str, ...]
+    next_within: StepSpan | None
+
+
 class Command(Protocol):
     """A transaction of a generated module."""
 

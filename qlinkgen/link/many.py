@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, cast
 
-from qlinkgen.link.codec import Codec, Command, Framed, Many, Message, address_of
+from qlinkgen.link.codec import Codec, Command, EachOf, Framed, Many, Message, UntilStopped, address_of
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeIs
+
+
+def is_listed(many: Many) -> TypeIs[EachOf]:
+    """Whether each node in a list of the request sends an answer."""
+    return hasattr(many, "each")
+
+
+def is_endless(many: Many | None) -> TypeIs[UntilStopped]:
+    """Whether only another command ends the answers."""
+    return hasattr(many, "stopped_by")
 
 
 def nodes_asked(many: Many, request: Message) -> Sequence[int] | None:
     """The nodes of which each sends one answer, as the request lists them; None for other ends."""
-    each: str = getattr(many, "each", "")  # of an `EachOf`
-    if not each:
+    if not is_listed(many):
         return None
-    listed = getattr(request, each)
-    key: str = getattr(many, "key", "")
-    return [int(getattr(item, key)) for item in listed] if key else list(map(int, listed))
+    listed = getattr(request, many.each)
+    return [int(getattr(item, many.key)) for item in listed] if many.key else list(map(int, listed))
 
 
-def is_endless(command: Command) -> bool:
-    """Whether only another command ends the answers of a command."""
-    return hasattr(command.many, "stopped_by")  # of an `UntilStopped`
+def stops(codec: Codec) -> Iterator[tuple[Command, Stop]]:
+    """The commands whose answers only another command ends, and how it does."""
+    for command in codec.COMMANDS.values():
+        if is_endless(command.many):
+            yield command, Stop(command.many, codec)
 
 
 class Stop:
@@ -28,15 +41,13 @@ class Stop:
 
     __slots__ = ("_broadcast", "_compared", "_make", "_repeats", "_to_all", "command")
 
-    def __init__(self, command: Command, codec: Codec) -> None:
-        """``command`` is the one with these answers."""
-        many: Any = command.many  # an `UntilStopped` of the generated module
+    def __init__(self, many: UntilStopped, codec: Codec) -> None:
+        """``many`` is that of the command with these answers."""
         self.command: Command = codec.COMMANDS[many.stopped_by]
         self._broadcast = codec.BUS.broadcast
-        self._make: Any = self.command.request  # its arguments are those of the class
-        self._repeats: tuple[str, ...] = many.repeats
-        fields = _fields(self._make)
-        self._compared = [name for name in self._repeats if name in fields]
+        self._repeats = many.repeats
+        self._make = cast(Any, self.command.request)  # Any: arguments and fields are those of the class
+        self._compared = [name for name in self._repeats if name in self._make.FIELDS]
         self._to_all = self.command.addressing == "broadcast"
 
     def of(self, request: Framed) -> Framed:
@@ -56,11 +67,6 @@ class Stop:
         return same and address in {None, self._broadcast, address_of(request)}
 
 
-def _fields(message: Any) -> Sequence[str]:  # Any: a class of the generated module
-    found: tuple[str, ...] = message.FIELDS
-    return found
-
-
 class Answers:
     """The answers so far.
 
@@ -76,7 +82,7 @@ class Answers:
         self._many = many
         self._alone = alone and many.within is not None
         self.nodes = nodes_asked(many, request)
-        self._by: str = getattr(many, "by", "")
+        self._by = many.by if is_listed(many) else ""
         self._found: dict[int, Framed] = {}
         #: Number of answers, 0 if something else ends them.
         self._last = int(getattr(request, many.counted_by)) if many.counted_by else many.count

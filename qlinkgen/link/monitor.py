@@ -29,7 +29,7 @@ from qlinkgen.link.codec import (
 from qlinkgen.link.dialogue import Progress
 from qlinkgen.link.events import Damaged, Stray
 from qlinkgen.link.gaps import Gap
-from qlinkgen.link.many import Answers, Stop, is_endless
+from qlinkgen.link.many import Answers, stops
 from qlinkgen.link.timing import Timing
 from qlinkgen.link.transaction import Accepts
 from qlinkgen.link.turn import has_turns
@@ -150,9 +150,7 @@ class Monitor:
         self._askers = 2 if codec.BUS.kind == "link" else 1
         #: Earlier requests whose answers have no end.
         self._streams: list[_Pending] = []
-        self._stops = {
-            name: Stop(command, codec) for name, command in codec.COMMANDS.items() if is_endless(command)
-        }
+        self._stops = {command.name: stop for command, stop in stops(codec)}
         self._answer_to = answer_to(codec)
         self._turns = any(has_turns(command) for command in codec.COMMANDS.values())
         self._gap = Gap(timing.silence)

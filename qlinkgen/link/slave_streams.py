@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import cast
 
 from qlinkgen.link.codec import Codec, Framed, Message
-from qlinkgen.link.many import Stop, is_endless
+from qlinkgen.link.many import stops
 from qlinkgen.link.slave_dialogue import PENDING, Answers
 
 #: Encodes an answer to a request.
@@ -30,11 +30,7 @@ class Flows:
 
     def __init__(self, codec: Codec, encode: Encode) -> None:
         self._encode = encode
-        self._stops = {
-            command.request: Stop(command, codec)
-            for command in codec.COMMANDS.values()
-            if is_endless(command)
-        }
+        self._stops = {command.request: stop for command, stop in stops(codec)}
         self._commands = {command.request: command for command in codec.COMMANDS.values()}
         self._open = deque[_Flow]()
 

@@ -9,7 +9,7 @@ from typing import Any
 from qlinkgen.errors import LinkError, NoReply, Refused
 from qlinkgen.link.codec import Codec, Framed, cut, reason_of
 from qlinkgen.link.gaps import Gap
-from qlinkgen.link.many import Stop, is_endless
+from qlinkgen.link.many import stops
 from qlinkgen.link.pending import Pending
 from qlinkgen.link.timing import Timing
 
@@ -53,11 +53,7 @@ class Streams:
         self._encode = codec.encode
         self._open: list[Stream] = []
         #: How each request with such answers is stopped.
-        self._stops = {
-            command.request: Stop(command, codec)
-            for command in codec.COMMANDS.values()
-            if is_endless(command)
-        }
+        self._stops = {command.request: stop for command, stop in stops(codec)}
 
     def __bool__(self) -> bool:
         """Whether there is one."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from qlinkgen.link.asked import answer_to
 from qlinkgen.link.codec import Codec, Command, Echoes, Framed, Many, Message, is_message
-from qlinkgen.link.many import is_endless, nodes_asked
+from qlinkgen.link.many import is_endless, is_listed, nodes_asked
 from qlinkgen.link.slave_dialogue import Handling
 from qlinkgen.link.turn import is_turned
 from qlinkgen.plan import Plan
@@ -82,16 +82,16 @@ class GenericNode:
     ) -> list[Message] | Iterator[Message]:
         """Return as few answers as there may be; those without an end all the time."""
         assert command.response is not None
-        if (nodes := nodes_asked(many, request)) is not None:
-            by: str = getattr(many, "by", "")
-            own = [{**values, by: node} for node in nodes] if by else [values]
+        if is_listed(many):
+            nodes = nodes_asked(many, request)
+            own = [{**values, many.by: node} for node in nodes or ()] if many.by else [values]
             return [self._answer(command.response, request, command.echoes, each) for each in own]
         if many.until is not None:
             field, first, _ = many.until
             values = {**values, field: first}
         count = int(getattr(request, many.counted_by)) if many.counted_by else many.count
         one = self._answer(command.response, request, command.echoes, values)
-        if is_endless(command):
+        if is_endless(many):
             return itertools.repeat(one)
         if many.reply is None:
             return [one] * (count or 1)

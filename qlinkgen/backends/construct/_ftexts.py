@@ -174,7 +174,7 @@ class TextList(Construct):
         self.maximum = maximum
         self.sizes = _text_sizes(_innermost(item))
 
-    def _parse(self, stream: BinaryIO, context: Container, path: str) -> list[Any]:
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> list[object]:
         data = stream_read_entire(stream, path)
         texts = data.split(self.separator) if data else []
         if not self.minimum <= len(texts) <= self.maximum:
@@ -186,8 +186,8 @@ class TextList(Construct):
         return [self.item.parse(text) for text in texts]
 
     def _build(
-        self, obj: Sequence[Any], stream: BinaryIO, context: Container, path: str
-    ) -> Sequence[Any]:
+        self, obj: Sequence[object], stream: BinaryIO, context: Container, path: str
+    ) -> Sequence[object]:
         if not self.minimum <= len(obj) <= self.maximum:
             raise RangeError(f"{len(obj)} items", path=path)
         data = self.separator.join([self.item.build(each) for each in obj])
