@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Literal, assert_never, get_args
 
 from qlinkgen.model.checksum import Checksum as Algorithm
 from qlinkgen.model.coding import Coding, Escape, Insert
@@ -549,3 +549,16 @@ class FrameKinds:
 
 OneFrame = DelimitedFrame | MarkedFrame | PacketFrame
 Frame = OneFrame | FrameKinds
+
+
+def id_pieces(frame: Frame) -> tuple[PartBits, ...]:
+    """The pieces of the message id that parts hold, of all kinds of frame."""
+    match frame:
+        case DelimitedFrame():
+            return frame.id_bits
+        case FrameKinds():
+            return tuple(each for kind in frame.kinds for each in kind.frame.id_bits)
+        case MarkedFrame() | PacketFrame():
+            return ()
+        case _:
+            assert_never(frame)

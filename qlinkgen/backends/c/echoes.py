@@ -7,7 +7,7 @@ from typing import assert_never
 
 from qlinkgen.backends.c.names import count_type, integer_type, literal, scalar_type, unsigned
 from qlinkgen.model.fields import Record, Records, Value
-from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds, PartBits
+from qlinkgen.model.frame import Frame, PartBits, id_pieces
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import member
 from qlinkgen.model.transaction import Command
@@ -61,14 +61,7 @@ def _repeated(command: Command, answer: Message) -> Iterator[tuple[Value, str | 
 
 def _piece(frame: Frame, name: str, numbers: Mapping[int, str | int]) -> PartBits | None:
     """The piece of an id with a number for each id, None if it is not in one place."""
-    match frame:
-        case DelimitedFrame():
-            pieces = frame.id_bits
-        case FrameKinds():
-            pieces = tuple(each for kind in frame.kinds for each in kind.frame.id_bits)
-        case _:
-            pieces = ()
-    for piece in pieces:
+    for piece in id_pieces(frame):
         mask = (1 << piece.bits) - 1
         if piece.name == name and all(number >> piece.at & mask == of for number, of in numbers.items()):
             return piece
