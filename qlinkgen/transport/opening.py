@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 from typing import Literal
 
 from qlinkgen.transport.port import Port
@@ -51,3 +52,13 @@ def open_port(
         )
 
     return ReopeningPort(opener) if reopen else opener()
+
+
+@contextlib.contextmanager
+def closing_on_error(port: Port) -> Iterator[Port]:
+    """Close a port if an error occurs while its user is made."""
+    try:
+        yield port
+    except BaseException:
+        port.close()
+        raise

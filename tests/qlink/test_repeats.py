@@ -8,9 +8,11 @@ import pytest
 
 from qlinkgen.codecs import qlink
 from qlinkgen.errors import NoReply
+from qlinkgen.protocols.qlink import Bus
 from qlinkgen.protocols.qlink.bus_state import BusState
 from qlinkgen.protocols.qlink.motion import Repeats
-from qlinkgen.sim import FaultPlan
+from qlinkgen.sim import FaultPlan, Wire
+from qlinkgen.sim.pty_bus import PtyBus
 from tests.qlink.behaviour_rig import Probe, Setting, Slave, make_rig
 from tests.qlink.conftest import MakeRig
 
@@ -86,3 +88,12 @@ def test_no_word_of_a_stream_is_lost_or_doubled(client: Literal["blocking", "asy
 def test_another_word_is_refused() -> None:
     with pytest.raises(ValueError, match="known are answered, auto, silent"):
         BusState("maybe")  # type: ignore[arg-type]
+
+
+@pytest.mark.pty
+def test_a_port_is_closed_again_if_an_option_is_wrong() -> None:
+    with PtyBus(Wire(baud=None)) as line:
+        for _ in range(2):  # an open port would be in use
+            with pytest.raises(ValueError, match="repeats"):
+                Bus.open(line.path, repeats="maybe")  # type: ignore[arg-type]
+        Bus.open(line.path).close()

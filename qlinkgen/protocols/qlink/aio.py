@@ -6,7 +6,7 @@ import asyncio
 from collections import defaultdict
 from collections.abc import AsyncGenerator, Callable, Iterable, Mapping
 from os import PathLike
-from typing import TypeVar
+from typing import TypeVar, Unpack
 
 from qlinkgen.codecs import qlink
 from qlinkgen.codecs.qlink_bus import AsyncMasterCalls, AsyncNodeCalls
@@ -20,9 +20,10 @@ from qlinkgen.protocols.qlink.bus_state import BusState, make_engine
 from qlinkgen.protocols.qlink.facts import BAUD, BROADCAST, NODES, PIECE
 from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport
 from qlinkgen.protocols.qlink.motion import MotionProgress, Repeats, move
+from qlinkgen.protocols.qlink.options import BusOptions
 from qlinkgen.protocols.qlink.pacing import SyncReport, SyncTick
 from qlinkgen.transport.aio import AsyncMaster
-from qlinkgen.transport.opening import open_port
+from qlinkgen.transport.opening import closing_on_error, open_port
 from qlinkgen.transport.port import Port
 
 R = TypeVar("R", bound=qlink.Message)
@@ -57,31 +58,10 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         self._moving: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
 
     @classmethod
-    def open(
-        cls,
-        name: str,
-        *,
-        baud: int | None = None,
-        attempts: int = 3,
-        echo: EchoMode = "auto",
-        health: HealthPolicy | None = HealthPolicy(),  # noqa: B008  # immutable
-        slack: float | None = None,
-        crc: str | None = None,
-        repeats: Repeats = "answered",
-        on_event: Callable[[Event], None] | None = None,
-    ) -> AsyncBus:
+    def open(cls, name: str, *, baud: int | None = None, **options: Unpack[BusOptions]) -> AsyncBus:
         """Open a device name or a URL of pyserial, like `Bus.open`. Opening is fast, so it is synchronous."""
-        port = open_port(name, baud=baud or BAUD)
-        return cls(
-            port,
-            attempts=attempts,
-            echo=echo,
-            health=health,
-            slack=slack,
-            crc=crc,
-            repeats=repeats,
-            on_event=on_event,
-        )
+        with closing_on_error(open_port(name, baud=baud or BAUD)) as port:
+            return cls(port, **options)
 
     async def transact(self, request: Question, *, attempts: int | None = None, trial: bool = False) -> Reply:
         """As `Bus.transact`."""

@@ -6,7 +6,7 @@ import threading
 from collections import defaultdict
 from collections.abc import Callable, Generator, Iterable, Mapping
 from os import PathLike
-from typing import TypeVar
+from typing import TypeVar, Unpack
 
 from qlinkgen.codecs import qlink
 from qlinkgen.codecs.qlink_bus import MasterCalls, NodeCalls
@@ -21,9 +21,10 @@ from qlinkgen.protocols.qlink.bus_state import BusState, make_engine
 from qlinkgen.protocols.qlink.facts import BAUD, BROADCAST, NODES, PIECE
 from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport
 from qlinkgen.protocols.qlink.motion import MotionProgress, MotionState, Repeats, move, unanswered
+from qlinkgen.protocols.qlink.options import BusOptions
 from qlinkgen.protocols.qlink.pacing import SyncReport, SyncTick
 from qlinkgen.transport.blocking import BlockingMaster
-from qlinkgen.transport.opening import open_port
+from qlinkgen.transport.opening import closing_on_error, open_port
 from qlinkgen.transport.port import Port
 
 R = TypeVar("R", bound=qlink.Message)
@@ -81,36 +82,15 @@ class Bus(BlockingMaster, MasterCalls):
         self._moving = defaultdict(threading.Lock)
 
     @classmethod
-    def open(
-        cls,
-        name: str,
-        *,
-        baud: int | None = None,
-        attempts: int = 3,
-        echo: EchoMode = "auto",
-        health: HealthPolicy | None = HealthPolicy(),  # noqa: B008  # immutable
-        slack: float | None = None,
-        crc: str | None = None,
-        repeats: Repeats = "answered",
-        on_event: Callable[[Event], None] | None = None,
-    ) -> Bus:
+    def open(cls, name: str, *, baud: int | None = None, **options: Unpack[BusOptions]) -> Bus:
         """Open a device name or a URL of pyserial, by default at 115200 baud; the rest as for the class.
 
         Raises:
             PortMissing: the port does not exist.
             PortBusy: another program uses it, or this user lacks the permission.
         """
-        port = open_port(name, baud=baud or BAUD)
-        return cls(
-            port,
-            attempts=attempts,
-            echo=echo,
-            health=health,
-            slack=slack,
-            crc=crc,
-            repeats=repeats,
-            on_event=on_event,
-        )
+        with closing_on_error(open_port(name, baud=baud or BAUD)) as port:
+            return cls(port, **options)
 
     def transact(self, request: Question, *, attempts: int | None = None, trial: bool = False) -> Reply:
         """As `BlockingMaster.transact`.

@@ -5,7 +5,6 @@ A program uses a node through a client, while a driver runs the node (`qlinkgen.
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Generic, Protocol, Self, TypeVar
@@ -39,16 +38,6 @@ def engine_of(node: Node) -> RingNode:
 def paced_baud(port: Port) -> int | None:
     """Return the speed of a paced port, else None, for the `baud` of an engine."""
     return port.baud if port.capabilities.paced is Ability.YES else None
-
-
-@contextlib.contextmanager
-def closing_on_error(port: Port) -> Iterator[Port]:
-    """Close a port if an error occurs while its node is made."""
-    try:
-        yield port
-    except BaseException:
-        port.close()
-        raise
 
 
 class Driver(Protocol):

@@ -11,7 +11,6 @@ from qlinkgen.protocols.trio.client import (
     BlockingClient,
     CoordinatorClient,
     Item,
-    closing_on_error,
     paced_baud,
 )
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode, mode_message, send_message
@@ -26,7 +25,7 @@ from qlinkgen.protocols.trio.options import (
     NodeOptions,
 )
 from qlinkgen.protocols.trio.printing import Number
-from qlinkgen.transport.opening import open_port
+from qlinkgen.transport.opening import closing_on_error, open_port
 from qlinkgen.transport.port import Port
 from qlinkgen.transport.ring import OnEvent, RingDriver, drive
 
