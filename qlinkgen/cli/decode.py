@@ -13,6 +13,7 @@ from typing import cast
 import click
 
 from qlinkgen.cli import jsonlines
+from qlinkgen.cli.arguments import protocol_argument
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.codec import fields, load_codec
 from qlinkgen.cli.common import (
@@ -42,7 +43,7 @@ _COMMENT = re.compile(rb"#[^\n]*")
 
 
 @click.command("decode")
-@click.argument("protocol")
+@protocol_argument
 @click.argument("hex_", metavar="[HEX|-]...", nargs=-1)
 @click.option(
     "--direction", type=click.Choice(["request", "response"]), help="Direction of the frames; see above."

@@ -7,21 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from qlinkgen.codecs import qlink
+from qlinkgen.link.codec import Module
+from qlinkgen.link.echo import PROBE
 from qlinkgen.transport.conversation import host_slack, timing_of
 from qlinkgen.transport.port import Ability, Port
-
-#: The request that costs are computed for: the most frequent one of a motion program.
-COMMAND = qlink.COMMANDS["motion"]
 
 #: A latency above this takes longer than most transactions.
 TOO_SLOW = 0.002
 
 #: Seconds without a byte after which a line is idle; a polling master pauses far less.
 QUIET = 0.1
-
-#: Q.link receivers hunt for the preamble A5 A5, so they ignore this byte.
-PROBE = b"\x00"
 
 RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
 RULE_FILE = "/etc/udev/rules.d/99-qlinkgen.rules"
@@ -55,35 +50,42 @@ class Echo:
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """The terms of a transaction's deadline, in seconds; `longest` is the size of request and response."""
+    """The terms of a transaction's deadline, in seconds.
+
+    `longest` is the size of request and response; `frame_ends` the silence or break that marks frames.
+    """
 
     command: str
     longest: int
     on_wire: float
     allowance: float
     host_slack: float
+    frame_ends: float
     deadline: float
 
 
-def cost(port: Port) -> Cost:
-    """Compute the duration of a transaction on a port."""
-    timing = timing_of(qlink, port)
-    longest = COMMAND.request.MAX_WIRE_SIZE + (COMMAND.response.MAX_WIRE_SIZE if COMMAND.response else 0)
-    terms = timing.on_wire(longest), timing.allowance(COMMAND), timing.host_slack
-    return Cost(COMMAND.name, longest, *terms, timing.deadline(COMMAND))
+def cost(port: Port, codec: Module) -> Cost:
+    """Compute the duration of the longest transaction on a port."""
+    timing = timing_of(codec, port)
+    command = max(codec.COMMANDS.values(), key=timing.deadline)
+    deadline, allowance = timing.deadline(command), timing.allowance(command)
+    on_wire = deadline - allowance - timing.slack
+    ends = timing.slack - timing.host_slack
+    size = round(on_wire / timing.byte_time)
+    return Cost(command.name, size, on_wire, allowance, timing.host_slack, ends, deadline)
 
 
 def probe(port: Port) -> Echo:
-    """Send one byte on an idle line and listen for it."""
+    """Send a byte of an echo probe on an idle line and listen for it."""
     if noise := port.read(QUIET):
         return Echo(None, None, noise.hex())
     sent = port.now()
-    port.write(PROBE)
+    port.write(PROBE[:1])
     received = port.read(QUIET + host_slack(port))
     seconds = port.now() - sent
     if not received:
         return Echo(False, None, "")
-    return Echo(True if received == PROBE else None, seconds, received.hex())
+    return Echo(True if received == PROBE[:1] else None, seconds, received.hex())
 
 
 def advise(port: Port, name: str, echo: Echo | None) -> list[Advice]:

@@ -8,13 +8,15 @@ from enum import Enum
 
 import click
 
-from qlinkgen.cli.boundary import FINE, WRONG
-from qlinkgen.cli.common import on_terminal
+from qlinkgen.cli.arguments import driven_protocol_argument, port_argument
+from qlinkgen.cli.boundary import FINE, WRONG, Failure
+from qlinkgen.cli.codec import load_codec
+from qlinkgen.cli.common import load_protocol, on_terminal
 from qlinkgen.cli.diagnosis import Advice, Cost, Echo, advise, cost, probe
 from qlinkgen.cli.tables import Table
-from qlinkgen.cli.wire_options import open_line
+from qlinkgen.cli.wire_options import baud_option, echo_mode, open_free
+from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import Json
-from qlinkgen.protocols.qlink.facts import BAUD
 from qlinkgen.transport.conversation import ASSUMED_LATENCY, OTHER_PROGRAM, WAKE_UP
 from qlinkgen.transport.port import Ability, Capabilities, Port
 
@@ -43,42 +45,48 @@ _MEANINGS = {
 
 
 @click.command("doctor")
-@click.argument("port")
+@driven_protocol_argument
+@port_argument
+@baud_option
 @click.option(
-    "--baud",
-    type=click.IntRange(1, 100_000_000),
-    default=BAUD,
-    show_default=True,
-    metavar="N",
-    help="Baud rate.",
-)
-@click.option(
-    "--probe", "probing", is_flag=True, help="Send one byte 00, which Q.link ignores, and listen for it."
+    "--probe", "probing", is_flag=True, help="Send one byte 00, which begins no frame, and listen for it."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
-def command(port: str, baud: int, probing: bool, as_json: bool) -> int:
+def command(protocol: str, port: str, baud: int | None, probing: bool, as_json: bool) -> int:
     """Open PORT and report what it can do, how its latency affects a transaction, and what to change.
 
-    PORT is a device such as /dev/ttyUSB0 or COM3, or a URL such as socket://HOST:PORT. Nothing is sent
-    without --probe.
+    PORT is a device such as /dev/ttyUSB0 or COM3, or a URL such as socket://HOST:PORT. The transaction is the
+    longest one of PROTOCOL; a ring has none. Nothing is sent without --probe.
 
     Exit code 1 if a line begins with fix, or if the port is missing, busy or lost.
-    """
-    with open_line(port, baud) as opened:
+
+    \b
+    qlinkgen doctor qlink /dev/ttyUSB0
+    qlinkgen doctor modbus_rtu /dev/ttyUSB0 --baud 9600 --json
+    """  # noqa: D301  # click takes the character \b for "do not wrap"
+    loaded = load_protocol(protocol)
+    if probing and echo_mode(loaded, None) != "auto":
+        raise Failure(f"--probe: a frame of {loaded.name} may begin with 00, the byte to send; omit it")
+    with open_free(loaded, port, baud) as opened:
         echo = probe(opened) if probing else None
         advice = advise(opened, port, echo)
         show = _show_json if as_json else _show_text
-        show(opened, cost(opened), echo, advice)
+        show(opened, _cost(opened, loaded), echo, advice)
     return WRONG if any(each.kind == "fix" for each in advice) else FINE
 
 
-def _show_json(port: Port, total: Cost, echo: Echo | None, advice: list[Advice]) -> None:
+def _cost(port: Port, protocol: Protocol) -> Cost | None:
+    """Return the cost of a transaction, None for a protocol without transactions."""
+    return cost(port, load_codec(protocol)) if protocol.commands else None
+
+
+def _show_json(port: Port, total: Cost | None, echo: Echo | None, advice: list[Advice]) -> None:
     found = {key: _plain(value) for key, value in asdict(port.capabilities).items()}
     answer = {
         "port": port.name,
         "baud": port.baud,
         **found,
-        "transaction": asdict(total),
+        "transaction": None if total is None else asdict(total),
         "echo": None if echo is None else asdict(echo),
         "advice": [asdict(each) for each in advice],
     }
@@ -92,9 +100,10 @@ def _plain(value: Json | Enum) -> Json:
     return value
 
 
-def _show_text(port: Port, total: Cost, echo: Echo | None, advice: list[Advice]) -> None:
+def _show_text(port: Port, total: Cost | None, echo: Echo | None, advice: list[Advice]) -> None:
     _abilities(port, echo).show()
-    _terms(port, total).show()
+    if total is not None:
+        _terms(port, total).show()
     for each in advice:
         colour = {"fix": "yellow", "note": "cyan"}[each.kind]
         kind = click.style(each.kind, fg=colour, bold=True) if on_terminal() else each.kind
@@ -133,15 +142,19 @@ def _terms(port: Port, total: Cost) -> Table:
         if latency is None
         else f"{_time(latency)} of latency"
     )
-    table = Table(["term", "time", "reason"], f"One {total.command} of Q.link", right=frozenset({"time"}))
+    table = Table(
+        ["term", "time", "reason"], f"One {total.command}, the longest transaction", right=frozenset({"time"})
+    )
     size = f"{total.longest} bytes, the longest request and response"
     table.add("on the wire", _time(total.on_wire), size)
-    table.add("allowance", _time(total.allowance), "three byte times for the node to begin its response")
+    table.add("allowance", _time(total.allowance), "for the node to begin its response")
     other = f", {_time(OTHER_PROGRAM)} for the program at its other end" * (
         port.capabilities.paced is Ability.NO
     )
     woken = f"{held}{other}, and {_time(WAKE_UP)} to wake this program"
     table.add("host slack", _time(total.host_slack), woken)
+    if total.frame_ends:
+        table.add("silence", _time(total.frame_ends), "a silence or break that separates frames")
     table.add(
         "deadline", _time(total.deadline), "the sum; without a response until then, the request is repeated"
     )

@@ -9,6 +9,7 @@ from types import ModuleType
 import click
 
 from qlinkgen.cli import jsonlines
+from qlinkgen.cli.arguments import assignments_argument, message_argument, protocol_argument
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.codec import MessageObject, build, load_codec
 from qlinkgen.cli.common import (
@@ -44,9 +45,9 @@ json_option = click.option(
 
 
 @click.command("encode")
-@click.argument("protocol")
-@click.argument("message", required=False)
-@click.argument("assignments", metavar="[FIELD=VALUE]...", nargs=-1)
+@protocol_argument
+@message_argument
+@assignments_argument
 @address_option
 @json_option
 @click.option("--request", "request", metavar="HEX", help="Packets: the request of a response.")

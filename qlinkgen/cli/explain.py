@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import click
 
+from qlinkgen.cli.arguments import protocol_argument
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.common import (
     crc_option,
@@ -30,7 +31,7 @@ Line = tuple[int, str, str, str, bool]
 
 
 @click.command("explain")
-@click.argument("protocol")
+@protocol_argument
 @click.argument("hex_", metavar="HEX...", nargs=-1, required=True)
 @click.option(
     "--direction",

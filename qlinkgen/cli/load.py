@@ -8,8 +8,10 @@ from collections.abc import Callable, Iterator
 
 import click
 
+from qlinkgen.cli.arguments import driven_protocol_argument, port_argument
 from qlinkgen.cli.boundary import INTERRUPTED, USAGE, WRONG, Failure
 from qlinkgen.cli.common import crc_option, on_terminal
+from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.cli.wire_options import (
     attempts_option,
     baud_option,
@@ -35,7 +37,8 @@ LINES = 10
 
 
 @click.command("load")
-@click.argument("port")
+@driven_protocol_argument
+@port_argument
 @click.argument("file", metavar="FILE.hex", type=click.Path())
 @click.option("--node", required=True, callback=qlink_node, metavar="N", help="Node to load, 1..16.")
 @click.option(
@@ -52,6 +55,7 @@ LINES = 10
 @echo_option
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
+    protocol: str,
     port: str,
     file: str,
     node: int,
@@ -71,8 +75,10 @@ def command(  # noqa: PLR0917  # click passes them by name
     Exit code 1 if the file is wrong, a piece is not acknowledged, or the port is missing, busy or lost.
 
     \b
-    qlinkgen load /dev/ttyUSB0 --node 3 program.hex
+    qlinkgen load qlink /dev/ttyUSB0 --node 3 program.hex
     """  # noqa: D301  # click takes the character \b for "do not wrap"
+    if not is_shipped(protocol, "qlink"):
+        raise Failure(f"{protocol} has no procedure that loads a program; qlink has one")
     text = _text(file)
     with_crc(qlink, qlink.Codec, crc)
     with open_line(port, baud or BAUD) as opened:

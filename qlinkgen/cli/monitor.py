@@ -6,6 +6,7 @@ import math
 
 import click
 
+from qlinkgen.cli.arguments import driven_protocol_argument, port_argument
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import crc_option, load_protocol
@@ -28,10 +29,8 @@ BELONGS: Belongs = {"slack": (BUS,)}
 
 
 @click.command("monitor")
-@click.argument("port")
-@click.option(
-    "--protocol", default="qlink", show_default=True, metavar="PROTOCOL", help="Protocol on the line."
-)
+@driven_protocol_argument
+@port_argument
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line instead of text.")
 @click.option("--raw", is_flag=True, help="Add the bytes of each frame.")
 @click.option("--count", type=click.IntRange(1), metavar="N", help="End after N frames, damaged ones too.")
@@ -42,8 +41,8 @@ BELONGS: Belongs = {"slack": (BUS,)}
 @stop_bits_option
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
-    port: str,
     protocol: str,
+    port: str,
     as_json: bool,
     raw: bool,
     count: int | None,
@@ -68,9 +67,9 @@ def command(  # noqa: PLR0917  # click passes them by name
     without a response, {"at", "asked", "error": {...}} a damaged frame, with the node of the pending request.
 
     \b
-    qlinkgen monitor /dev/ttyUSB1
-    qlinkgen monitor /dev/ttyUSB1 --json --count 1000 > traffic.jsonl
-    qlinkgen monitor /dev/ttyUSB1 --protocol trio --baud 38400
+    qlinkgen monitor qlink /dev/ttyUSB1
+    qlinkgen monitor qlink /dev/ttyUSB1 --json --count 1000 > traffic.jsonl
+    qlinkgen monitor trio /dev/ttyUSB1 --baud 38400
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc)
     kind = kind_of(loaded)

@@ -6,6 +6,7 @@ import math
 
 import click
 
+from qlinkgen.cli.arguments import driven_protocol_argument, port_argument
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import crc_option, load_protocol, warn
@@ -27,10 +28,8 @@ from qlinkgen.link.ring_events import RingEvent
 
 
 @click.command("ring")
-@click.argument("port")
-@click.option(
-    "--protocol", default="trio", show_default=True, metavar="PROTOCOL", help="Protocol on the ring."
-)
+@driven_protocol_argument
+@port_argument
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line instead of text.")
 @click.option("--raw", is_flag=True, help="Add the bytes of each message, as received.")
 @click.option("--count", type=click.IntRange(1), metavar="N", help="End after N messages, damaged ones too.")
@@ -40,8 +39,8 @@ from qlinkgen.link.ring_events import RingEvent
 @stop_bits_option
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
-    port: str,
     protocol: str,
+    port: str,
     as_json: bool,
     raw: bool,
     count: int | None,
@@ -61,12 +60,12 @@ def command(  # noqa: PLR0917  # click passes them by name
     {"at", "error": {...}, "sent_on"}. After the end of the command, the ring is open at this node.
 
     \b
-    qlinkgen ring /dev/ttyUSB0 --baud 38400
-    qlinkgen ring /dev/ttyUSB0 --baud 38400 --json --count 1000 > traffic.jsonl
+    qlinkgen ring trio /dev/ttyUSB0 --baud 38400
+    qlinkgen ring trio /dev/ttyUSB0 --baud 38400 --json --count 1000 > traffic.jsonl
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc)
     if kind_of(loaded) is not RING:
-        raise Failure(f"{loaded.name} is not a ring; use `qlinkgen monitor PORT --protocol {protocol}`")
+        raise Failure(f"{loaded.name} is not a ring; use `qlinkgen monitor {protocol} {port}`")
     codec = load_codec(loaded)
     opened = open_free(loaded, port, baud, line_of(parity, stop_bits))
     with StopSignals() as signals, RingPlace(opened, codec) as place:

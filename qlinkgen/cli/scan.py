@@ -9,8 +9,10 @@ from collections.abc import Callable, Iterator
 import click
 
 from qlinkgen.cli import jsonlines
-from qlinkgen.cli.boundary import FINE, WRONG
+from qlinkgen.cli.arguments import driven_protocol_argument, port_argument
+from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.common import crc_option, on_terminal, warn
+from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.cli.tables import Table
 from qlinkgen.cli.wire_options import (
     baud_option,
@@ -30,7 +32,8 @@ from qlinkgen.protocols.qlink.facts import BAUD, NODES
 
 
 @click.command("scan")
-@click.argument("port")
+@driven_protocol_argument
+@port_argument
 @click.option(
     "--nodes", default="1-16", show_default=True, metavar="LIST", help="Nodes to ask: 3, 1-16 or 1,3,5-7."
 )
@@ -40,6 +43,7 @@ from qlinkgen.protocols.qlink.facts import BAUD, NODES
 @echo_option
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
+    protocol: str,
     port: str,
     nodes: str,
     as_json: bool,
@@ -57,9 +61,11 @@ def command(  # noqa: PLR0917  # click passes them by name
     Exit code 1 if no node answers clearly, or if the port is missing, busy or lost.
 
     \b
-    qlinkgen scan /dev/ttyUSB0
-    qlinkgen scan /dev/ttyUSB0 --nodes 1-4 --json
+    qlinkgen scan qlink /dev/ttyUSB0
+    qlinkgen scan qlink /dev/ttyUSB0 --nodes 1-4 --json
     """  # noqa: D301  # click takes the character \b for "do not wrap"
+    if not is_shipped(protocol, "qlink"):
+        raise Failure(f"{protocol} cannot be scanned; qlink can")
     numbers = parse_nodes(nodes, NODES[0], NODES[-1])
     with_crc(qlink, qlink.Codec, crc)
     with open_line(port, baud or BAUD) as opened:
@@ -68,7 +74,8 @@ def command(  # noqa: PLR0917  # click passes them by name
             bus.on_event = lambda event: show(event.node) if isinstance(event, Sent) else None
             found = bus.scan(numbers)
     if not found:
-        warn(f"no node answers on {port}; check power, wiring and --baud, and `qlinkgen doctor {port}`")
+        look = f"`qlinkgen doctor {protocol} {port}`"
+        warn(f"no node answers on {port}; check power, wiring and --baud, and {look}")
         return WRONG
     if as_json:
         click.echo("\n".join(jsonlines.line(_record(each)) for each in found))

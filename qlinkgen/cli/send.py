@@ -7,6 +7,12 @@ from typing import Literal
 
 import click
 
+from qlinkgen.cli.arguments import (
+    assignments_argument,
+    driven_protocol_argument,
+    message_argument,
+    port_argument,
+)
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.encode import address_option, compose, json_option
@@ -39,10 +45,10 @@ BELONGS: Belongs = {
 
 
 @click.command("send")
-@click.argument("port")
-@click.argument("protocol")
-@click.argument("message", required=False)
-@click.argument("assignments", metavar="[FIELD=VALUE]...", nargs=-1)
+@driven_protocol_argument
+@port_argument
+@message_argument
+@assignments_argument
 @address_option
 @json_option
 @click.option(
@@ -83,8 +89,8 @@ BELONGS: Belongs = {
 )
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
-    port: str,
     protocol: str,
+    port: str,
     message: str | None,
     assignments: tuple[str, ...],
     addresses: tuple[str, ...],
@@ -120,11 +126,11 @@ def command(  # noqa: PLR0917  # click passes them by name
     port is missing, busy or lost; 2 if the request is invalid, and nothing was sent.
 
     \b
-    qlinkgen send /dev/ttyUSB0 qlink motor_position --node 3
-    qlinkgen send /dev/ttyUSB0 qlink motion --node 3 counter=1 outputs=0x0F segments=100,200
-    qlinkgen send /dev/ttyUSB0 qlink node_start --node 0
-    qlinkgen send /dev/ttyUSB0 trio character_transfer --address 2 characters=HELLO --baud 38400
-    qlinkgen send /dev/ttyUSB0 mc1231a set_vel value=2.75 --axis 2 --baud 57600
+    qlinkgen send qlink /dev/ttyUSB0 motor_position --node 3
+    qlinkgen send qlink /dev/ttyUSB0 motion --node 3 counter=1 outputs=0x0F segments=100,200
+    qlinkgen send qlink /dev/ttyUSB0 node_start --node 0
+    qlinkgen send trio /dev/ttyUSB0 character_transfer --address 2 characters=HELLO --baud 38400
+    qlinkgen send mc1231a /dev/ttyUSB0 set_vel value=2.75 --axis 2 --baud 57600
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc)
     kind = kind_of(loaded)

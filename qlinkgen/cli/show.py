@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from qlinkgen.cli import bitmap, describe
+from qlinkgen.cli.arguments import message_argument, protocol_argument
 from qlinkgen.cli.common import find_message, load_protocol, version_option, warn_unconfirmed
 from qlinkgen.cli.layout import UNCONFIRMED, show_enum, show_flags, show_message
 from qlinkgen.cli.plan_text import envelopes, parts_table, show_frame_plan, show_message_plan
@@ -18,8 +19,8 @@ from qlinkgen.plan.ends import ByMark
 
 
 @click.command("show")
-@click.argument("protocol")
-@click.argument("message", required=False)
+@protocol_argument
+@message_argument
 @click.option("--plan", "planned", is_flag=True, help="Show how it is built and decoded; see docs/plan.md.")
 @version_option
 def command(protocol: str, message: str | None, *, planned: bool, version: str | None) -> None:

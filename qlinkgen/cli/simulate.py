@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from qlinkgen.cli.arguments import protocol_argument
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, kind_of, shipped_kind
@@ -13,7 +14,7 @@ BELONGS: Belongs = {"nodes": (BUS,), "echo": (BUS,), "ring": (RING,), "crc": (BU
 
 
 @click.command("simulate")
-@click.argument("protocol")
+@protocol_argument
 @click.option("--nodes", metavar="LIST", help="Nodes of a bus: 3, 1-16 or 1,3,5-7; one node by default.")
 @click.option(
     "--ring",

@@ -105,14 +105,14 @@ class Timing:
             return 0.0
         sent = command.request.MAX_WIRE_SIZE if request_size is None else request_size
         size = sent + _longest_answer(command)
-        return self.on_wire(size) + self.allowance(command) + self._slack
+        return self.on_wire(size) + self.allowance(command) + self.slack
 
     def patience(self, command: Command, reply: OtherReply) -> float:
         """Return the time from a pending reply to the answer."""
         if reply.within is None or command.response is None:
             return self.deadline(command, 0)
         byte_times, seconds = reply.within
-        allowance = self._time(byte_times, seconds) + self._slack
+        allowance = self._time(byte_times, seconds) + self.slack
         return self.on_wire(_longest_answer(command)) + allowance
 
     def duration(self, many: Many) -> float:
@@ -124,12 +124,12 @@ class Timing:
         within: StepSpan | None = getattr(command.many, "next_within", None)
         if within is None:
             return self.deadline(command, 0)
-        return self.on_wire(_longest_answer(command)) + self._time(*within) + self._slack
+        return self.on_wire(_longest_answer(command)) + self._time(*within) + self.slack
 
     def step(self, step: tuple[str, type[Framed], StepSpan | None]) -> float:
         """Return the time until a frame of a dialogue is complete, after the one before it."""
         _, message, within = step
-        allowance = self._time(*within or (0.0, 0.0)) + self._slack
+        allowance = self._time(*within or (0.0, 0.0)) + self.slack
         return self.on_wire(message.MAX_WIRE_SIZE) + allowance
 
     def pause(self, reply: OtherReply) -> float:
@@ -137,8 +137,8 @@ class Timing:
         return self._time(*reply.after)
 
     @property
-    def _slack(self) -> float:
-        """What the host and the frame of an answer add to its bytes."""
+    def slack(self) -> float:
+        """Seconds that the host, and a silence or break of the frame, add to the bytes of an answer."""
         return self.host_slack + self.silence + self.line_break
 
     def _time(self, byte_times: float, seconds: float) -> float:

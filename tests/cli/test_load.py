@@ -37,7 +37,7 @@ def program(tmp_path: Path) -> Path:
 def test_a_program_arrives(program: Path) -> None:
     node = VirtualNode(3)
     with bus(node) as running:
-        done = call("load", running.path, "--node", "3", program, *CALM)
+        done = call("load", "qlink", running.path, "--node", "3", program, *CALM)
     text = read_hex(program).text
     assert done.returncode == 0
     pieces = -(-len(text) // 25)
@@ -54,7 +54,7 @@ def test_a_program_arrives(program: Path) -> None:
 def test_lost_answers_are_repeats(program: Path, qlinkgen: Run, on_line: OnLine) -> None:
     node = VirtualNode(3)
     port = on_line(line(node, faults=FaultPlan(drop=0.2, seed=4)))
-    result = qlinkgen("load", port, "--node", "3", program, "--patience", "60")
+    result = qlinkgen("load", "qlink", port, "--node", "3", program, "--patience", "60")
     assert result.code == 0
     found = re.search(r" (\d+) repeats?,", result.out)
     assert found
@@ -64,7 +64,7 @@ def test_lost_answers_are_repeats(program: Path, qlinkgen: Run, on_line: OnLine)
 
 
 def test_a_silent_node(program: Path, qlinkgen: Run, on_line: OnLine) -> None:
-    result = qlinkgen("load", on_line(line(VirtualNode(3))), "--node", "4", program)
+    result = qlinkgen("load", "qlink", on_line(line(VirtualNode(3))), "--node", "4", program)
     assert (result.code, result.out) == (1, "")
     assert f"node 4: 0 of {size(program)} bytes were acknowledged" in result.err
 
@@ -83,7 +83,18 @@ class Stubborn(VirtualNode):
 def test_ctrl_c_in_the_middle(program: Path) -> None:
     node = Stubborn(3)
     with bus(node) as running:
-        command = ("load", running.path, "--node", "3", program, "--slack", "0.2", "--patience", "1000")
+        command = (
+            "load",
+            "qlink",
+            running.path,
+            "--node",
+            "3",
+            program,
+            "--slack",
+            "0.2",
+            "--patience",
+            "1000",
+        )
         with started(*command) as process:
             wait_for(lambda: node.statistics.requests > 6)
             code, out, err = end(process, signal.SIGINT)
@@ -91,14 +102,25 @@ def test_ctrl_c_in_the_middle(program: Path) -> None:
         assert f"interrupted: node 3 has acknowledged 100 of {size(program)} bytes and holds part" in err
         assert "load it again" in err
         assert "Traceback" not in err
-        done = call("send", running.path, "qlink", "motor_position", "--node", "3", *CALM)
+        done = call("send", "qlink", running.path, "motor_position", "--node", "3", *CALM)
         assert done.returncode == 0
 
 
 def test_a_port_that_is_lost_in_the_middle(program: Path) -> None:
     node = Stubborn(3)
     with bus(node) as running:
-        command = ("load", running.path, "--node", "3", program, "--slack", "0.2", "--patience", "1000")
+        command = (
+            "load",
+            "qlink",
+            running.path,
+            "--node",
+            "3",
+            program,
+            "--slack",
+            "0.2",
+            "--patience",
+            "1000",
+        )
         with started(*command) as process:
             wait_for(lambda: node.statistics.requests > 6)
             running.close()
@@ -110,7 +132,7 @@ def test_a_port_that_is_lost_in_the_middle(program: Path) -> None:
 
 def test_a_bar_on_a_terminal(program: Path) -> None:
     with bus(VirtualNode(3)) as running:
-        code, out, shown = on_terminal("load", running.path, "--node", "3", program, *CALM)
+        code, out, shown = on_terminal("load", "qlink", running.path, "--node", "3", program, *CALM)
     assert code == 0
     assert "node 3" in shown
     assert "\x1b[" in shown
@@ -131,7 +153,7 @@ def test_a_wrong_file_is_found_before_the_port_is_opened(
 ) -> None:
     file = tmp_path / "wrong.hex"
     file.write_text(text)
-    result = qlinkgen("load", "/dev/not-there", "--node", "3", file)
+    result = qlinkgen("load", "qlink", "/dev/not-there", "--node", "3", file)
     assert (result.code, result.out) == (1, "")
     assert words in result.err
     assert str(file) in result.err
@@ -149,12 +171,12 @@ def test_a_wrong_file_is_found_before_the_port_is_opened(
     ],
 )
 def test_errors(qlinkgen: Run, program: Path, arguments: tuple[str, ...], code: int, text: str) -> None:
-    result = qlinkgen("load", "/dev/not-there", program, *arguments)
+    result = qlinkgen("load", "qlink", "/dev/not-there", program, *arguments)
     assert (result.code, result.out) == (code, "")
     assert text in result.err
 
 
 def test_a_file_that_is_not_there(qlinkgen: Run, tmp_path: Path) -> None:
-    result = qlinkgen("load", "/dev/not-there", tmp_path / "nothing.hex", "--node", "3")
+    result = qlinkgen("load", "qlink", "/dev/not-there", tmp_path / "nothing.hex", "--node", "3")
     assert result.code == 2
     assert "nothing.hex: No such file or directory" in result.err

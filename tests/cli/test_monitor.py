@@ -47,14 +47,14 @@ def finish(process: subprocess.Popen[bytes]) -> tuple[int, str, str]:
 
 
 def send(qlinkgen: Run, path: str, *words: str) -> None:
-    assert qlinkgen("send", path, "qlink", *words, *CALM).code == 0
+    assert qlinkgen("send", "qlink", path, *words, *CALM).code == 0
 
 
 def test_a_bus_on_which_others_talk(qlinkgen: Run) -> None:
     with (
         bus() as running,
         tapped(running) as ear,
-        started("monitor", ear, "--json", "--count", "5", "--raw", *SLACK) as monitor,
+        started("monitor", "qlink", ear, "--json", "--count", "5", "--raw", *SLACK) as monitor,
     ):
         listening(monitor)
         send(qlinkgen, running.path, "motion", "--node", "3", "counter=1", "segments=7,8")
@@ -84,7 +84,7 @@ def test_a_bus_on_which_others_talk(qlinkgen: Run) -> None:
 
 def test_what_others_say_is_not_disturbed() -> None:
     with open_pty() as port:
-        with started("monitor", port.path) as monitor:
+        with started("monitor", "qlink", port.path) as monitor:
             listening(monitor)
             port.write(qlink.MotorPositionRequest(node=3).to_frame())
             read_until(monitor.stdout, "silent")
@@ -94,9 +94,11 @@ def test_what_others_say_is_not_disturbed() -> None:
         assert port.read(0) == b""
 
 
-def heard(port: PtyPort, *pieces: bytes, options: tuple[str, ...] = ()) -> tuple[str, str]:
+def heard(
+    port: PtyPort, *pieces: bytes, protocol: str | Path = "qlink", options: tuple[str, ...] = ()
+) -> tuple[str, str]:
     """Return the output for these frames, in order."""
-    with started("monitor", port.path, "--slack", "0.2", *options) as monitor:
+    with started("monitor", protocol, port.path, "--slack", "0.2", *options) as monitor:
         listening(monitor)
         out = ""
         for piece in pieces:
@@ -112,7 +114,7 @@ def test_everything_that_is_not_as_usual() -> None:
     answer = qlink.MotorPositionResponse(node=3, position=-7).to_frame()
     stray = qlink.MotorPositionResponse(node=9, position=1).to_frame()
     bad = ask[:-1] + bytes([ask[-1] ^ 1])
-    with open_pty() as port, started("monitor", port.path, "--slack", "0.2") as monitor:
+    with open_pty() as port, started("monitor", "qlink", port.path, "--slack", "0.2") as monitor:
         listening(monitor)
         port.write(ask)
         lines = read_until(monitor.stdout, "silent")
@@ -169,12 +171,12 @@ def test_faults_make_repeats_visible(qlinkgen: Run) -> None:
     with (
         bus(VirtualNode(1), faults=plan) as running,
         tapped(running) as ear,
-        started("monitor", ear, "--json", "--slack", "0.05") as monitor,
+        started("monitor", "qlink", ear, "--json", "--slack", "0.05") as monitor,
     ):
         listening(monitor)
         for _ in range(4):
-            request = ("qlink", "motor_position", "--node", "1", "--attempts", "200", "--slack", "0.05")
-            assert qlinkgen("send", running.path, *request, "--echo", "none").code == 0
+            request = ("motor_position", "--node", "1", "--attempts", "200", "--slack", "0.05")
+            assert qlinkgen("send", "qlink", running.path, *request, "--echo", "none").code == 0
         read_until(monitor.stdout, '"repeat": true')
         assert end(monitor, signal.SIGTERM)[0] == 0
     assert plan.counts["drop"] > 0
@@ -184,7 +186,7 @@ def test_a_schema_of_the_user() -> None:
     with (
         simulated(MODBUS, "--nodes", "7") as (path, _),
         open_pty() as ear,
-        started("monitor", ear.path, "--protocol", MODBUS, "--seconds", "1000", *SLACK) as monitor,
+        started("monitor", MODBUS, ear.path, "--seconds", "1000", *SLACK) as monitor,
     ):
         listening(monitor)
         with SerialPort(path, 19200) as port:
@@ -214,14 +216,14 @@ def test_a_message_of_no_command() -> None:
     file = REPOSITORY / "tests" / "schemas" / "kitchen_sink.yaml"
     hello = load(load_schema(file)).MESSAGES["hello"](station=4, serial=99).to_frame()
     with open_pty() as port:
-        out, err = heard(port, hello, options=("--protocol", str(file)))
+        out, err = heard(port, hello, protocol=file)
     assert re.search(r"\? > \? +hello +serial=99 \[unasked\]", out)
     assert err.startswith("qlinkgen: 1 frame, 0 of them damaged; 0 requests not answered")
 
 
 def test_seconds_end_it(qlinkgen: Run) -> None:
     with open_pty() as port:
-        result = qlinkgen("monitor", port.path, "--seconds", "0.05")
+        result = qlinkgen("monitor", "qlink", port.path, "--seconds", "0.05")
     assert (result.code, result.out) == (0, "")
     assert result.err.splitlines() == [
         f"qlinkgen: listening to qlink on {port.path}; press Ctrl-C to stop",
@@ -230,7 +232,7 @@ def test_seconds_end_it(qlinkgen: Run) -> None:
 
 
 def test_a_port_that_goes_away() -> None:
-    with open_pty() as port, started("monitor", port.path) as monitor:
+    with open_pty() as port, started("monitor", "qlink", port.path) as monitor:
         listening(monitor)
         port.close()
         code, out, err = finish(monitor)
@@ -243,7 +245,7 @@ def test_a_port_that_goes_away() -> None:
 @FULL_DISK
 def test_a_full_disk(qlinkgen: Run) -> None:
     with bus() as running, tapped(running) as ear:
-        with Path("/dev/full").open("wb") as full, started("monitor", ear, stdout=full) as monitor:
+        with Path("/dev/full").open("wb") as full, started("monitor", "qlink", ear, stdout=full) as monitor:
             listening(monitor)
             send(qlinkgen, running.path, "motor_position", "--node", "1")
             _, err = monitor.communicate(timeout=PATIENCE)
@@ -254,7 +256,7 @@ def test_a_full_disk(qlinkgen: Run) -> None:
 
 
 def test_a_reader_that_goes_away(qlinkgen: Run) -> None:
-    with bus() as running, tapped(running) as ear, started("monitor", ear) as monitor:
+    with bus() as running, tapped(running) as ear, started("monitor", "qlink", ear) as monitor:
         listening(monitor)
         assert monitor.stdout is not None
         monitor.stdout.close()
@@ -263,9 +265,9 @@ def test_a_reader_that_goes_away(qlinkgen: Run) -> None:
 
 
 def test_two_at_one_port() -> None:
-    with open_pty() as port, started("monitor", port.path) as first:
+    with open_pty() as port, started("monitor", "qlink", port.path) as first:
         listening(first)
-        second = call("monitor", port.path)
+        second = call("monitor", "qlink", port.path)
         assert (second.returncode, second.stdout) == (1, "")
         assert f"{port.path} is in use by" in second.stderr
         assert f"(process {first.pid})" in second.stderr
@@ -275,12 +277,12 @@ def test_two_at_one_port() -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
-        (("/dev/not-there",), 1, "port '/dev/not-there' does not exist"),
-        (("x", "--protocol", "trio", "--slack", "1"), 2, "--slack requires a bus with a master"),
-        (("x", "--protocol", "mc1231a"), 2, "`qlinkgen decode mc1231a --direction request --raw < x`"),
-        (("x", "--protocol", "nope"), 2, "unknown schema 'nope'"),
-        (("x", "--count", "0"), 2, "--count"),
-        (("x", "--seconds", "soon"), 2, "--seconds soon: not a number of seconds"),
+        (("qlink", "/dev/not-there"), 1, "port '/dev/not-there' does not exist"),
+        (("trio", "x", "--slack", "1"), 2, "--slack requires a bus with a master"),
+        (("mc1231a", "x"), 2, "`qlinkgen decode mc1231a --direction request --raw < x`"),
+        (("nope", "x"), 2, "unknown schema 'nope'"),
+        (("qlink", "x", "--count", "0"), 2, "--count"),
+        (("qlink", "x", "--seconds", "soon"), 2, "--seconds soon: not a number of seconds"),
     ],
 )
 def test_errors(qlinkgen: Run, arguments: tuple[str, ...], code: int, text: str) -> None:

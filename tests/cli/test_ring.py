@@ -1,4 +1,4 @@
-"""The ring on the command line: `simulate trio`, `ring`, `send PORT trio`, `monitor --protocol trio`."""
+"""The ring on the command line: `simulate`, `ring`, `send` and `monitor` of trio."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_as_processes(tmp_path: Path) -> None:
 
 
 def send(qlinkgen: Run, path: str, *words: str) -> tuple[list[dict[str, object]], str]:
-    result = qlinkgen("send", path, "trio", *words)
+    result = qlinkgen("send", "trio", path, *words)
     assert result.code == 0, result.err
     return objects(result.out), result.err
 
@@ -100,8 +100,8 @@ def test_send_as_a_process_among_others() -> None:
     bad = HELLO.to_frame()[:-1] + bytes((0x90,))
     mine = trio.CharacterTransfer(address=1, characters="5").to_frame()
     with open_pty() as port:
-        words = ("trio", "keypad_mode", "mode=on_off", "--address", "2", *ROUND)
-        with started("send", port.path, *words) as node:
+        words = ("keypad_mode", "mode=on_off", "--address", "2", *ROUND)
+        with started("send", "trio", port.path, *words) as node:
             assert received(port, len(own)) == own
             port.write(HELLO.to_frame())
             assert received(port, len(HELLO.to_frame()))[1:-1] == HELLO.to_frame()[1:-1]
@@ -128,7 +128,7 @@ def test_ring_sends_on_and_prints() -> None:
     bad = bytearray(trio.DirectVariableTransfer(address=1, number=3, value=Decimal(2)).to_frame())
     bad[2] ^= 1
     with open_pty() as port:
-        with started("ring", port.path, "--count", "5") as node:
+        with started("ring", "trio", port.path, "--count", "5") as node:
             read_until(node.stderr, "joined the ring")
             port.write(b"\x05" + HELLO.to_frame() + unknown + mine.to_frame() + bytes(bad))
             out, err = node.communicate(timeout=60)
@@ -152,7 +152,7 @@ def test_ring_sends_on_and_prints() -> None:
 
 
 def test_ring_as_json() -> None:
-    with open_pty() as port, started("ring", port.path, "--json", "--raw") as node:
+    with open_pty() as port, started("ring", "trio", port.path, "--json", "--raw") as node:
         read_until(node.stderr, "joined the ring")
         port.write(HELLO.to_frame() + b"\x88")
         out = read_until(node.stdout, "error")
@@ -174,7 +174,7 @@ def test_ring_as_json() -> None:
 
 def test_ring_ends_by_itself(qlinkgen: Run) -> None:
     with open_pty() as port:
-        result = qlinkgen("ring", port.path, "--seconds", "0.05")
+        result = qlinkgen("ring", "trio", port.path, "--seconds", "0.05")
     assert (result.code, result.out) == (0, "")
     first, last = result.err.splitlines()
     assert first == f"qlinkgen: joined the ring on {port.path}; press Ctrl-C to stop"
@@ -185,7 +185,7 @@ def test_ring_ends_by_itself(qlinkgen: Run) -> None:
 
 
 def test_a_port_that_goes_away() -> None:
-    with open_pty() as port, started("ring", port.path) as node:
+    with open_pty() as port, started("ring", "trio", port.path) as node:
         read_until(node.stderr, "joined the ring")
         port.close()
         out, err = node.communicate(timeout=60)
@@ -197,10 +197,10 @@ def test_a_port_that_goes_away() -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
-        (("/dev/not-there",), 1, "port '/dev/not-there' does not exist"),
-        (("x", "--protocol", "qlink"), 2, "qlink is not a ring; use `qlinkgen monitor PORT"),
-        (("x", "--count", "0"), 2, "--count"),
-        (("x", "--seconds", "soon"), 2, "--seconds soon: not a number of seconds"),
+        (("trio", "/dev/not-there"), 1, "port '/dev/not-there' does not exist"),
+        (("qlink", "x"), 2, "qlink is not a ring; use `qlinkgen monitor qlink x`"),
+        (("trio", "x", "--count", "0"), 2, "--count"),
+        (("trio", "x", "--seconds", "soon"), 2, "--seconds soon: not a number of seconds"),
     ],
 )
 def test_errors(qlinkgen: Run, arguments: tuple[str, ...], code: int, text: str) -> None:
@@ -211,7 +211,7 @@ def test_errors(qlinkgen: Run, arguments: tuple[str, ...], code: int, text: str)
 
 def test_monitor_listens_on_a_fibre() -> None:
     bad = HELLO.to_frame()[:-1] + bytes((0x90,))
-    with open_pty() as port, started("monitor", port.path, "--protocol", "trio") as monitor:
+    with open_pty() as port, started("monitor", "trio", port.path) as monitor:
         read_until(monitor.stderr, "listening to trio")
         port.write(HELLO.to_frame() + bad)
         out = read_until(monitor.stdout, "damaged")

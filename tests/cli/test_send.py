@@ -34,7 +34,7 @@ def silent() -> Iterator[PtyPort]:
 
 def test_as_processes() -> None:
     with simulated("qlink", "--nodes", "3") as (path, _):
-        done = call("send", path, "qlink", "motion", "--node", "3", "counter=9", "segments=5,6", *CALM)
+        done = call("send", "qlink", path, "motion", "--node", "3", "counter=9", "segments=5,6", *CALM)
         assert (done.returncode, done.stderr) == (0, "")
         assert objects(done.stdout) == [
             {
@@ -43,7 +43,7 @@ def test_as_processes() -> None:
                 "fields": {"counter": 9, "inputs": 0, "position": 0, "motor_status": 2, "fifo_space": 46},
             }
         ]
-        started = call("send", path, "qlink", "node_start", "--node", "0")
+        started = call("send", "qlink", path, "node_start", "--node", "0")
         assert (started.returncode, started.stdout, started.stderr) == (0, "", "")
 
 
@@ -52,7 +52,7 @@ def test_the_counter_is_used_as_it_is(qlinkgen: Run) -> None:
     with bus(node) as running:
         for counter in (200, 200, 7):
             arguments = ("motion", "--node", "3", f"counter={counter}", "segments=1")
-            found = json.loads(qlinkgen("send", running.path, "qlink", *arguments, *CALM).out)
+            found = json.loads(qlinkgen("send", "qlink", running.path, *arguments, *CALM).out)
             assert found["fields"]["counter"] == counter
     assert (node.statistics.motions, node.statistics.duplicates) == (2, 1)
 
@@ -65,7 +65,7 @@ def test_every_way_to_say_it(qlinkgen: Run) -> None:
             ("motor_position", "--json", "{}", "--node", "1"),
             ("--json", '{"message": "motor_position.request", "node": 1, "fields": {}}'),
         ):
-            result = qlinkgen("send", running.path, "qlink", *words, *CALM)
+            result = qlinkgen("send", "qlink", running.path, *words, *CALM)
             assert (result.code, result.err) == (0, "")
             assert json.loads(result.out) == {
                 "message": "motor_position.response",
@@ -77,26 +77,26 @@ def test_every_way_to_say_it(qlinkgen: Run) -> None:
 def test_a_renumbered_node_may_answer_with_its_new_number(qlinkgen: Run) -> None:
     node = VirtualNode(3)
     with bus(node) as running:
-        result = qlinkgen("send", running.path, "qlink", "node_setup", "--node", "3", "node_number=9", *CALM)
+        result = qlinkgen("send", "qlink", running.path, "node_setup", "--node", "3", "node_number=9", *CALM)
     assert json.loads(result.out)["node"] == 9
     assert node.number == 9
 
 
 def test_no_answer(qlinkgen: Run, silent: PtyPort) -> None:
-    request = ("qlink", "motor_position", "--node", "4", "--slack", "0.05", "--echo", "none")
-    result = qlinkgen("send", silent.path, *request)
+    request = ("qlink", silent.path, "motor_position", "--node", "4", "--slack", "0.05", "--echo", "none")
+    result = qlinkgen("send", *request)
     assert (result.code, result.out) == (1, "")
     assert "motor_position.request to node 4: no answer; sent 3 times" in result.err
     frame = qlink.MotorPositionRequest(node=4).to_frame()
     assert silent.read(0) == 3 * frame
-    result = qlinkgen("send", silent.path, *request, "--attempts", "1")
+    result = qlinkgen("send", *request, "--attempts", "1")
     assert "sent once" in result.err
     assert silent.read(0) == frame
 
 
 def test_what_must_not_be_repeated_is_sent_once(qlinkgen: Run, silent: PtyPort) -> None:
     request = ("motor_request", "--node", "4", "motor_data=01", "--slack", "0.05", "--echo", "none")
-    assert qlinkgen("send", silent.path, "qlink", *request, "--attempts", "5").code == 1
+    assert qlinkgen("send", "qlink", silent.path, *request, "--attempts", "5").code == 1
     assert silent.read(0) == qlink.MotorRequestRequest(node=4, motor_data=b"\x01").to_frame()
 
 
@@ -127,25 +127,14 @@ def reciting(answer: bytes) -> Iterator[str]:
 
 
 def test_a_wrong_answer(qlinkgen: Run) -> None:
-    request = (
-        "qlink",
-        "motor_position",
-        "--node",
-        "4",
-        "--slack",
-        "0.3",
-        "--attempts",
-        "1",
-        "--echo",
-        "none",
-    )
+    request = ("motor_position", "--node", "4", "--slack", "0.3", "--attempts", "1", "--echo", "none")
     good = qlink.MotorPositionResponse(node=4, position=1).to_frame()
     with reciting(good[:-1] + bytes([good[-1] ^ 1])) as path:
-        result = qlinkgen("send", path, *request)
+        result = qlinkgen("send", "qlink", path, *request)
         assert (result.code, result.out) == (1, "")
         assert "received only invalid replies (crc)" in result.err
     with reciting(qlink.MotorPositionResponse(node=5, position=1).to_frame()) as path:
-        result = qlinkgen("send", path, *request)
+        result = qlinkgen("send", "qlink", path, *request)
         assert (result.code, result.out) == (1, "")
         assert 'not the response: {"message": "motor_position.response", "node": 5' in result.err
 
@@ -157,7 +146,7 @@ def test_a_refusal_of_the_schema_is_shown(qlinkgen: Run) -> None:
 
     with reciting(refusal.to_frame()) as path:
         request = ("read_input_registers", "--node", "7", "start=1")
-        result = qlinkgen("send", path, file, *request, "--attempts", "1", "--slack", "0.3")
+        result = qlinkgen("send", file, path, *request, "--attempts", "1", "--slack", "0.3")
     assert result.code == 1
     assert result.out == (
         '{"message": "read_input_registers.exception", "address": 7, '
@@ -173,7 +162,7 @@ def test_a_port_that_goes_away(qlinkgen: Run, silent: PtyPort) -> None:
 
     other = threading.Thread(target=unplug)
     other.start()
-    result = qlinkgen("send", silent.path, "qlink", "motor_position", "--node", "4", *CALM)
+    result = qlinkgen("send", "qlink", silent.path, "motor_position", "--node", "4", *CALM)
     other.join()
     assert (result.code, result.out) == (1, "")
     assert f"{silent.path} was lost" in result.err
@@ -181,12 +170,12 @@ def test_a_port_that_goes_away(qlinkgen: Run, silent: PtyPort) -> None:
 
 def test_two_commands_at_one_port(qlinkgen: Run) -> None:
     with bus() as running, open_port(running.path):
-        done = call("send", running.path, "qlink", "motor_position", "--node", "1")
+        done = call("send", "qlink", running.path, "motor_position", "--node", "1")
         assert (done.returncode, done.stdout) == (1, "")
         assert f"{running.path} is in use by" in done.stderr
         assert f"(process {os.getpid()})" in done.stderr
     with bus() as running:
-        assert call("send", running.path, "qlink", "motor_position", "--node", "1", *CALM).returncode == 0
+        assert call("send", "qlink", running.path, "motor_position", "--node", "1", *CALM).returncode == 0
 
 
 @pytest.mark.parametrize(
@@ -229,7 +218,7 @@ def test_two_commands_at_one_port(qlinkgen: Run) -> None:
 def test_what_cannot_be_sent_is_refused_first(
     qlinkgen: Run, silent: PtyPort, arguments: tuple[str, ...], text: str
 ) -> None:
-    result = qlinkgen("send", silent.path, *arguments)
+    result = qlinkgen("send", arguments[0], silent.path, *arguments[1:])
     assert (result.code, result.out) == (2, "")
     assert text in result.err
     assert silent.read(0) == b""
@@ -251,24 +240,24 @@ def test_a_message_that_nothing_answers(qlinkgen: Run, silent: PtyPort, path: Pa
     node = ["--node", "3"] if protocol.message(message).addresses else []
     wire = qlinkgen("encode", path, message, *node)
     assert wire.code == 0, wire.err
-    result = qlinkgen("send", silent.path, path, message, *node, "--baud", "9600")
+    result = qlinkgen("send", path, silent.path, message, *node, "--baud", "9600")
     assert (result.code, result.out) == (0, "")
     assert result.err.endswith(f"qlinkgen: {message} sent; it has no response\n")
     assert silent.read(PATIENCE).hex() == wire.out.strip()
 
 
 def test_no_port(qlinkgen: Run) -> None:
-    result = qlinkgen("send", "/dev/not-there", "qlink", "motor_position", "--node", "3")
+    result = qlinkgen("send", "qlink", "/dev/not-there", "motor_position", "--node", "3")
     assert (result.code, result.out) == (1, "")
     assert "port '/dev/not-there' does not exist" in result.err
 
 
 def test_a_schema_without_a_speed(qlinkgen: Run, thermo: Path, silent: PtyPort) -> None:
-    result = qlinkgen("send", silent.path, thermo, "set_target", "--node", "3")
+    result = qlinkgen("send", thermo, silent.path, "set_target", "--node", "3")
     assert result.code == 2
     assert "the schema of thermo states no speed; add --baud N" in result.err
     with simulated(thermo, "--nodes", "3") as (path, _):
-        result = qlinkgen("send", path, thermo, "get_log", "--node", "3", "first=0", "--baud", "9600", *CALM)
+        result = qlinkgen("send", thermo, path, "get_log", "--node", "3", "first=0", "--baud", "9600", *CALM)
     assert result.code == 0
     assert json.loads(result.out)["fields"] == {"samples": [], "heating": False, "level": 0}
     assert "get_log.request is unconfirmed" in result.err
@@ -276,29 +265,29 @@ def test_a_schema_without_a_speed(qlinkgen: Run, thermo: Path, silent: PtyPort) 
 
 def test_no_search_for_an_echo_without_a_preamble(qlinkgen: Run, silent: PtyPort) -> None:
     request = ("read_input_registers", "--node", "7", "start=1", "--attempts", "1", "--slack", "0.05")
-    assert qlinkgen("send", silent.path, SCHEMAS / "modbus_rtu.yaml", *request).code == 1
+    assert qlinkgen("send", SCHEMAS / "modbus_rtu.yaml", silent.path, *request).code == 1
     assert silent.read(0)[:1] == b"\x07"
     searching = ("motor_position", "--node", "4", "--attempts", "1", "--slack", "0.05")
-    assert qlinkgen("send", silent.path, "qlink", *searching).code == 1
+    assert qlinkgen("send", "qlink", silent.path, *searching).code == 1
     assert silent.read(0)[:4] == b"\0\0\xa5\xa5"
 
 
 @FULL_DISK
 def test_a_full_disk_leaves_a_usable_bus() -> None:
-    request = ("qlink", "motor_position", "--node", "1", *CALM)
+    request = ("motor_position", "--node", "1", *CALM)
     with simulated("qlink") as (path, _):
         with Path("/dev/full").open("wb") as full:
-            done = call("send", path, *request, stdout=full)
+            done = call("send", "qlink", path, *request, stdout=full)
         assert done.returncode == 1
         assert "No space left on device" in done.stderr
         assert "Traceback" not in done.stderr
-        assert call("send", path, *request).returncode == 0
+        assert call("send", "qlink", path, *request).returncode == 0
 
 
 def test_a_dialogue() -> None:
     schema = str(SCHEMAS / "answers.yaml")
     with simulated(schema, "--nodes", "3") as (path, _):
-        asked = ("send", path, schema, "transfer", "--node", "3", "number=5", *CALM)
+        asked = ("send", schema, path, "transfer", "--node", "3", "number=5", *CALM)
         done = call(*asked, "--then", '{"start": 2}', "--then", '{"data": "0102"}')
         assert (done.returncode, done.stderr) == (0, "")
         acknowledged = {"message": "ack", "node": 3, "fields": {}}
@@ -314,11 +303,11 @@ def test_a_dialogue() -> None:
 def test_answers_until_they_are_stopped() -> None:
     schema = str(SCHEMAS / "answers.yaml")
     with simulated(schema, "--nodes", "3") as (path, _):
-        done = call("send", path, schema, "observe", "--node", "3", "number=5", "--count", "3", *CALM)
+        done = call("send", schema, path, "observe", "--node", "3", "number=5", "--count", "3", *CALM)
         told = {"message": "observe.response", "node": 3, "fields": {"value": 0}}
         assert (done.returncode, done.stderr) == (0, "")
         assert objects(done.stdout) == [told] * 3
-        done = call("send", path, schema, "clear", "--node", "3", "number=5", "--count", "3", *CALM)
+        done = call("send", schema, path, "clear", "--node", "3", "number=5", "--count", "3", *CALM)
         assert done.returncode == 2
         assert "--count requires endless answers; clear.request has none: omit it" in done.stderr
 
@@ -326,7 +315,7 @@ def test_answers_until_they_are_stopped() -> None:
 def test_an_answer_of_each_node() -> None:
     schema = str(SCHEMAS / "answers.yaml")
     with simulated(schema, "--nodes", "3,5") as (path, _):
-        asked = ("send", path, schema, "gather", "--node", "0", "nodes=5,4,3")
+        asked = ("send", schema, path, "gather", "--node", "0", "nodes=5,4,3")
         done = call(*asked, "--slack", "0.4", "--attempts", "1", "--echo", "none")
         told = [{"message": "gather.response", "node": node, "fields": {"value": 0}} for node in (5, 3)]
         assert objects(done.stdout) == told

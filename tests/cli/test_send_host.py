@@ -25,15 +25,15 @@ def chip(chips: ChipSet | None = None) -> Iterator[tuple[str, ChipEngine]]:
 
 
 def send(qlinkgen: Run, path: str, *words: str) -> Result:
-    return qlinkgen("send", path, "mc1231a", *words, *SLACK)
+    return qlinkgen("send", "mc1231a", path, *words, *SLACK)
 
 
 def test_as_processes() -> None:
     with simulated("mc1231a") as (path, process):
-        done = call("send", path, "mc1231a", "set_vel", "value=2.75", "--axis", "2", *SLACK)
+        done = call("send", "mc1231a", path, "set_vel", "value=2.75", "--axis", "2", *SLACK)
         assert (done.returncode, done.stderr) == (0, "")
         assert objects(done.stdout) == [{"message": "set_vel.response", "fields": {}}]
-        found = call("send", path, "mc1231a", "get_vel", "--axis", "2", *SLACK)
+        found = call("send", "mc1231a", path, "get_vel", "--axis", "2", *SLACK)
         assert objects(found.stdout) == [{"message": "get_vel.response", "fields": {"value": 2.75}}]
         code, out, err = end(process, signal.SIGTERM)
     assert (code, out) == (0, "")
@@ -61,7 +61,7 @@ def test_without_checksum(qlinkgen: Run) -> None:
 
 def test_an_illegal_command(qlinkgen: Run) -> None:
     with chip(ChipSet(illegal=["get_pos"])) as (path, _):
-        result = qlinkgen("send", path, "mc1231a", "get_pos", "--axis", "1", "--slack", "0.3")
+        result = qlinkgen("send", "mc1231a", path, "get_pos", "--axis", "1", "--slack", "0.3")
     assert (result.code, result.out) == (1, "")
     assert "get_pos.request: unknown command" in result.err
 

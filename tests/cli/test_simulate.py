@@ -122,7 +122,7 @@ def test_echo() -> None:
 
 def test_another_checksum(qlinkgen: Run) -> None:
     with simulated("qlink", "--set", "crc=crc-16/xmodem") as (path, _):
-        request = ("send", path, "qlink", "motor_position", "--node", "1", "--echo", "none")
+        request = ("send", "qlink", path, "motor_position", "--node", "1", "--echo", "none")
         other = qlinkgen(*request, "--slack", "0.1", "--attempts", "1")
         assert other.code == 1
         assert "no answer" in other.err
@@ -147,7 +147,7 @@ def test_another_checksum(qlinkgen: Run) -> None:
 def test_a_schema_of_the_user(schema: str, request_: str, answer: dict[str, object], qlinkgen: Run) -> None:
     file = REPOSITORY / "tests" / "schemas" / f"{schema}.yaml"
     with simulated(file, "--nodes", "7") as (path, _):
-        done = qlinkgen("send", path, file, *request_.split(), *CALM)
+        done = qlinkgen("send", file, path, *request_.split(), *CALM)
     assert (done.code, done.err) == (0, "")
     (found,) = objects(done.out)
     command, address = request_.partition(" ")[0], "id" if schema == "dynamixel" else "address"
@@ -187,7 +187,7 @@ def test_frames_without_addresses(tmp_path: Path, qlinkgen: Run) -> None:
     assert refused.code == 2
     assert "have no address; omit --nodes 1" in refused.err
     with simulated(file) as (path, _):
-        done = qlinkgen("send", path, file, "get", *CALM)
+        done = qlinkgen("send", file, path, "get", *CALM)
     assert objects(done.out) == [{"message": "get.response", "fields": {"value": 0}}]
 
 

@@ -30,12 +30,12 @@ RUNS: dict[str, tuple[list[str], int]] = {
     "explain": (["qlink", "a5a504210315e8"], 0),
     "crc": (["list"], 0),
     "simulate": (["trio", "--nodes", "1"], 2),
-    "scan": (["/dev/null"], 1),
-    "send": (["/dev/null", "qlink", "motor_position", "--node", "3"], 1),
-    "load": (["/dev/null", "thermo.yaml", "--node", "3"], 1),
-    "monitor": (["/dev/null"], 1),
-    "ring": (["/dev/null", "--baud", "38400"], 1),
-    "doctor": (["/dev/null"], 1),
+    "scan": (["qlink", "/dev/null"], 1),
+    "send": (["qlink", "/dev/null", "motor_position", "--node", "3"], 1),
+    "load": (["qlink", "/dev/null", "thermo.yaml", "--node", "3"], 1),
+    "monitor": (["qlink", "/dev/null"], 1),
+    "ring": (["trio", "/dev/null", "--baud", "38400"], 1),
+    "doctor": (["qlink", "/dev/null"], 1),
 }
 every_command = pytest.mark.parametrize("command", RUNS)
 

@@ -16,14 +16,15 @@ from tests.transport.conftest import GET_SERIAL, PATIENCE, SET_SERIAL, Disguise,
 
 
 def test_text(qlinkgen: Run, pty: PtyPort) -> None:
-    result = qlinkgen("doctor", pty.path)
+    result = qlinkgen("doctor", "qlink", pty.path)
     assert (result.code, result.err) == (0, "")
     assert result.lines[0] == f"{pty.path} at 115200 baud"
     rows = [line.split() for line in result.lines]
     assert ["driver", "pty"] in rows
     assert [row[:3] for row in rows if row[:1] == ["exclusive"]] == [["exclusive", "yes", "other"]]
     assert "latency      0 us   a pty delivers bytes immediately" in result.lines
-    assert any(line.startswith("allowance      260 us  three byte times") for line in result.lines)
+    allowances = [row for row in rows if row[:1] == ["allowance"]]
+    assert [row[1:5] for row in allowances] == [["10.00", "ms", "for", "the"]]
     assert (
         "note: bytes ignore the baud rate here: the timing differs from that of a serial line" in result.lines
     )
@@ -33,7 +34,7 @@ def test_text(qlinkgen: Run, pty: PtyPort) -> None:
 
 
 def test_json(qlinkgen: Run, pty: PtyPort) -> None:
-    result = qlinkgen("doctor", pty.path, "--json", "--baud", "9600")
+    result = qlinkgen("doctor", "qlink", pty.path, "--json", "--baud", "9600")
     found = json.loads(result.out)
     assert result.code == 0
     assert list(found) == [
@@ -42,7 +43,7 @@ def test_json(qlinkgen: Run, pty: PtyPort) -> None:
     ]
     assert (found["port"], found["baud"], found["paced"], found["latency"]) == (pty.path, 9600, "no", 0.0)
     terms = found["transaction"]
-    assert terms["allowance"] == pytest.approx(3 * 10 / 9600)
+    assert (terms["command"], terms["allowance"], terms["frame_ends"]) == ("loop_back", 0.003125, 0.0)
     assert terms["on_wire"] == pytest.approx(terms["longest"] * 10 / 9600)
     assert terms["deadline"] == pytest.approx(terms["on_wire"] + terms["allowance"] + terms["host_slack"])
     assert found["echo"] is None
@@ -51,7 +52,7 @@ def test_json(qlinkgen: Run, pty: PtyPort) -> None:
 
 def test_a_slow_adapter_is_a_fix(qlinkgen: Run, pty: PtyPort, disguise: Disguise) -> None:
     disguise(pty.path, "ftdi_sio", "16\n")
-    result = qlinkgen("doctor", pty.path)
+    result = qlinkgen("doctor", "qlink", pty.path)
     assert result.code == 1
     (fix,) = [line for line in result.lines if line.startswith("fix: ")]
     assert (
@@ -67,14 +68,14 @@ def test_a_quick_adapter_needs_nothing(
 ) -> None:
     disguise(pty.path, "ftdi_sio", "1\n")
     monkeypatch.setattr(diagnosis, "BY_ID", Path("/nowhere"))
-    result = qlinkgen("doctor", pty.path)
+    result = qlinkgen("doctor", "qlink", pty.path)
     assert result.code == 0
     assert "note:" not in result.out
 
 
 def test_low_latency_refused(qlinkgen: Run, pty: PtyPort, disguise: Disguise) -> None:
     disguise(pty.path, "cp210x")
-    result = qlinkgen("doctor", pty.path)
+    result = qlinkgen("doctor", "qlink", pty.path)
     assert result.code == 0
     assert (
         f"note: the driver cp210x refused low latency; try `sudo setserial {pty.path} low_latency`"
@@ -89,7 +90,7 @@ def test_low_latency_without_a_number(
 ) -> None:
     disguise(pty.path, "serial8250")
     driver.register(GET_SERIAL, SET_SERIAL, [0] * 32)
-    result = qlinkgen("doctor", pty.path, "--json")
+    result = qlinkgen("doctor", "qlink", pty.path, "--json")
     found = json.loads(result.out)
     assert found["low_latency"] == "yes"
     (advice,) = found["advice"]
@@ -104,19 +105,19 @@ def test_a_name_that_stays(
     link.symlink_to(pty.path)
     monkeypatch.setattr(diagnosis, "BY_ID", tmp_path)
     note = f"note: {link} is a stable name of this adapter"
-    assert note in qlinkgen("doctor", pty.path).lines
-    assert "stays with" not in qlinkgen("doctor", link).out
+    assert note in qlinkgen("doctor", "qlink", pty.path).lines
+    assert "stays with" not in qlinkgen("doctor", "qlink", link).out
 
 
 def test_probe_without_echo(qlinkgen: Run, pty: PtyPort) -> None:
-    result = qlinkgen("doctor", pty.path, "--probe")
+    result = qlinkgen("doctor", "qlink", pty.path, "--probe")
     assert result.code == 0
     assert "local echo   no     the port does not receive its own bytes" in result.lines
     assert pty.read(0) == b"\0"
 
 
 def test_probe_with_echo(qlinkgen: Run) -> None:
-    result = qlinkgen("doctor", "loop://", "--probe")
+    result = qlinkgen("doctor", "qlink", "loop://", "--probe")
     assert result.code == 0
     (row,) = [line for line in result.lines if line.startswith("local echo")]
     assert "yes" in row
@@ -134,7 +135,7 @@ def test_probe_of_a_line_that_is_not_quiet(qlinkgen: Run, pty: PtyPort) -> None:
     other = threading.Thread(target=chatter)
     other.start()
     try:
-        result = qlinkgen("doctor", pty.path, "--probe", "--json")
+        result = qlinkgen("doctor", "qlink", pty.path, "--probe", "--json")
     finally:
         stop.set()
         other.join(PATIENCE)
@@ -163,7 +164,7 @@ def test_what_comes_back_is_not_the_echo() -> None:
 
 def test_text_of_an_unclear_probe(qlinkgen: Run, pty: PtyPort, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("qlinkgen.cli.doctor.probe", lambda port: diagnosis.Echo(None, None, "a5a5"))
-    result = qlinkgen("doctor", pty.path, "--probe")
+    result = qlinkgen("doctor", "qlink", pty.path, "--probe")
     assert result.code == 1
     assert "local echo   unknown  unexpected bytes: a5a5" in result.lines
     assert "fix: unexpected bytes on this line (a5a5); stop other masters" in result.out
@@ -171,18 +172,18 @@ def test_text_of_an_unclear_probe(qlinkgen: Run, pty: PtyPort, monkeypatch: pyte
 
 def test_colours_on_a_terminal(qlinkgen: Run, pty: PtyPort, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("qlinkgen.cli.doctor.on_terminal", lambda: True)
-    assert "ignore the baud rate" in qlinkgen("doctor", pty.path).out
+    assert "ignore the baud rate" in qlinkgen("doctor", "qlink", pty.path).out
 
 
 def test_missing(qlinkgen: Run) -> None:
-    result = qlinkgen("doctor", "/dev/ttyNONE0")
+    result = qlinkgen("doctor", "qlink", "/dev/ttyNONE0")
     assert (result.code, result.out) == (1, "")
     assert result.err.startswith("qlinkgen: error: port '/dev/ttyNONE0' does not exist; ")
 
 
 def test_busy(qlinkgen: Run, pty: PtyPort) -> None:
     with SerialPort(pty.path):
-        result = qlinkgen("doctor", pty.path, "--json")
+        result = qlinkgen("doctor", "qlink", pty.path, "--json")
     assert (result.code, result.out) == (1, "")
     assert f"(process {os.getpid()}); end it, or use another port" in result.err
 
@@ -195,7 +196,7 @@ def test_lost(qlinkgen: Run, pty: PtyPort, monkeypatch: pytest.MonkeyPatch) -> N
         return look(port)
 
     monkeypatch.setattr("qlinkgen.cli.doctor.probe", unplug)
-    result = qlinkgen("doctor", pty.path, "--probe")
+    result = qlinkgen("doctor", "qlink", pty.path, "--probe")
     assert (result.code, result.out) == (1, "")
     assert result.err.startswith(f"qlinkgen: error: {pty.path} was lost (")
 
@@ -204,7 +205,7 @@ def test_lost(qlinkgen: Run, pty: PtyPort, monkeypatch: pytest.MonkeyPatch) -> N
     "arguments", [[], [""], ["/dev/null", "--baud", "0"], ["/dev/null", "--baud", "fast"]]
 )
 def test_usage(qlinkgen: Run, arguments: list[str]) -> None:
-    assert qlinkgen("doctor", *arguments).code == 2
+    assert qlinkgen("doctor", "qlink", *arguments).code == 2
 
 
 def test_help_lists_it(qlinkgen: Run) -> None:

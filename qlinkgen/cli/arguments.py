@@ -1,0 +1,42 @@
+"""Arguments that many commands have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from qlinkgen._resources import library_dir, schemas_dir
+from qlinkgen.cli.boundary import Failure
+
+
+def _protocol(context: click.Context, parameter: click.Parameter, value: str) -> str:  # noqa: ARG001
+    """Refuse a port in place of the protocol: until 0.1, the port was first."""
+    if is_port(value) and not _is_schema(value):
+        raise Failure(
+            f"'{value}' is a port, and PROTOCOL comes before PORT; write qlinkgen {context.info_name} "
+            f"PROTOCOL {value}"
+        )
+    return value
+
+
+def is_port(name: str) -> bool:
+    """Whether a name can only be that of a port: a device or a URL."""
+    return "://" in name or name.startswith("/dev/") or Path(name).is_char_device()
+
+
+def _is_schema(name: str) -> bool:
+    folders = (schemas_dir(), library_dir())
+    return name.endswith((".yaml", ".yml")) or any((each / f"{name}.yaml").is_file() for each in folders)
+
+
+#: PROTOCOL.
+protocol_argument = click.argument("protocol")
+#: PROTOCOL of a command that has a port too.
+driven_protocol_argument = click.argument("protocol", callback=_protocol)
+#: PORT.
+port_argument = click.argument("port")
+#: [MESSAGE], after PROTOCOL.
+message_argument = click.argument("message", required=False)
+#: [FIELD=VALUE]..., after MESSAGE.
+assignments_argument = click.argument("assignments", metavar="[FIELD=VALUE]...", nargs=-1)
