@@ -1,4 +1,4 @@
-"""Arguments that many commands have."""
+"""Arguments that many commands have, with their completion in a shell."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from qlinkgen._resources import library_dir, schemas_dir
+from qlinkgen.cli import completion
 from qlinkgen.cli.boundary import Failure
 
 
@@ -31,12 +32,14 @@ def _is_schema(name: str) -> bool:
 
 
 #: PROTOCOL.
-protocol_argument = click.argument("protocol")
+protocol_argument = click.argument("protocol", shell_complete=completion.protocols)
 #: PROTOCOL of a command that has a port too.
-driven_protocol_argument = click.argument("protocol", callback=_protocol)
+driven_protocol_argument = click.argument("protocol", callback=_protocol, shell_complete=completion.protocols)
 #: PORT.
-port_argument = click.argument("port")
+port_argument = click.argument("port", shell_complete=completion.ports)
 #: [MESSAGE], after PROTOCOL.
-message_argument = click.argument("message", required=False)
+message_argument = click.argument("message", required=False, shell_complete=completion.messages)
 #: [FIELD=VALUE]..., after MESSAGE.
-assignments_argument = click.argument("assignments", metavar="[FIELD=VALUE]...", nargs=-1)
+assignments_argument = click.argument(
+    "assignments", metavar="[FIELD=VALUE]...", nargs=-1, shell_complete=completion.assignments
+)

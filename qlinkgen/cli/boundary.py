@@ -16,6 +16,8 @@ from qlinkgen.model.texts import visible
 FINE, WRONG, USAGE = 0, 1, 2
 #: An internal error; EX_SOFTWARE of sysexits.h.
 FAULT = 70
+#: Variable of the environment by which a shell asks for completion, as click names it.
+COMPLETE = "_QLINKGEN_COMPLETE"
 #: Exit codes that a shell reports for a program ended by these signals.
 INTERRUPTED, BROKEN_PIPE = 130, 141
 
@@ -53,6 +55,10 @@ def run(cli: click.Command) -> int:
 
 
 def _invoke(cli: click.Command) -> int:
+    if instruction := os.environ.get(COMPLETE):
+        from click.shell_completion import shell_complete  # noqa: PLC0415  # only a shell asks for it
+
+        return shell_complete(cli, {}, "qlinkgen", COMPLETE, instruction)
     try:
         # Not cli.main(): it turns a broken pipe into exit code 1, like a bad frame.
         with cli.make_context("qlinkgen", sys.argv[1:]) as context:

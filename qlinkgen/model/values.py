@@ -19,6 +19,7 @@ from fractions import Fraction
 from typing import SupportsInt, TypeAlias, assert_never
 
 from qlinkgen.model.fields import Layout, Record, Records, Value, applies, chosen
+from qlinkgen.model.spelling import similar
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Float, Scalar
 
 #: A JSON value; numbers with a decimal point are read as Decimal.
@@ -366,7 +367,9 @@ def _bool(name: str, given: Json) -> bool:
 def _named_or_number(name: str, given: Json, names: Mapping[str, int]) -> int:
     number = whole_number(given) if isinstance(given, str) else given
     if isinstance(number, bool) or not isinstance(number, int):
-        raise BadValue(f"{name}: {_shown(given)} is unknown; one of {', '.join(names)}, or a number")
+        close = similar(given, names) if isinstance(given, str) else ()
+        meant = f"did you mean {close[0]}? It is " if close else ""
+        raise BadValue(f"{name}: {_shown(given)} is unknown; {meant}one of {', '.join(names)}, or a number")
     return number
 
 
