@@ -246,7 +246,8 @@ def _directions(found: Doc) -> dict[str, set[str]]:
     sent: list[tuple[str, str]] = []
     for spec in found["commands"].values():
         kind, response = spec.get("frame", ""), spec["response"]
-        answer = response.get("frame", kind) if isinstance(response, dict) else kind
+        stated = response.get("frame") if isinstance(response, dict) else None
+        answer = stated if isinstance(stated, str) and "fields" in response else kind
         sent += [(kind, "request"), (answer, "response")]
         for step in spec.get("steps", ()):
             sent += [
