@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, final
 
 from qlinkgen.link.codec import Command, Framed, StepSpan
-from qlinkgen.link.turn import Collected, Misread, has_turns, is_turned
+from qlinkgen.link.turn import Collected, Misread, has_turns, is_turned, steps_of
 
 #: A later frame of a master: a message, or a function that makes it from the answers so far.
 Further = Framed | Callable[[Sequence[Any]], Framed]  # Any: answers of several classes
@@ -35,7 +35,7 @@ class Progress:
 
     def __init__(self, command: Command) -> None:
         self._command = command
-        self._steps = command.steps
+        self._steps = steps_of(command)
         self.at = 0
         #: The bytes so far of a frame that only its turn tells.
         self._collected: Collected | None = None
@@ -100,11 +100,12 @@ class Conversation(Progress):
 
     Attributes:
         has_turns: only their turn tells some of its frames.
+        is_alone: it is a request and its response, which only its turn tells.
         answers: the answers so far.
         sent: what the master has sent last.
     """
 
-    __slots__ = ("_further", "_request", "_sends", "_sent_at", "answers", "has_turns", "sent")
+    __slots__ = ("_further", "_request", "_sends", "_sent_at", "answers", "has_turns", "is_alone", "sent")
 
     def __init__(self, command: Command, request: Framed, further: Sequence[Further]) -> None:
         """Check what the master is going to send.
@@ -124,6 +125,7 @@ class Conversation(Progress):
             if not callable(given):
                 _check(given, kind)
         self.has_turns = has_turns(command)
+        self.is_alone = not command.steps
         self._further = further
         self._request = request
         self.restart()

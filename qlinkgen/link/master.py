@@ -681,7 +681,7 @@ class MasterEngine:
         several: object = response if answers is None else answers.result
         if answers is not None and self.streams.is_one(pending):
             several = self.streams.begin(pending, response if answers.items else None, now)
-        if self._dialogue is not None and self._dialogue.ended:
+        if self._dialogue is not None and self._dialogue.ended and not self._dialogue.is_alone:
             several = tuple(self._dialogue.answers)
         self._outcome = reply = attempts.reply(several, now)
         self._answered(response, now)

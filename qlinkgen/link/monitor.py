@@ -32,7 +32,7 @@ from qlinkgen.link.gaps import Gap
 from qlinkgen.link.many import Answers, stops
 from qlinkgen.link.timing import Timing
 from qlinkgen.link.transaction import Accepts
-from qlinkgen.link.turn import has_turns
+from qlinkgen.link.turn import has_turns, steps_of
 
 
 class Asked(NamedTuple):
@@ -89,7 +89,7 @@ class _Pending:
         self.begun = False
         self.reported = self.answered
         #: The dialogue, None for a request and its response and after the end.
-        self.dialogue = Progress(command) if command.steps else None
+        self.dialogue = Progress(command) if steps_of(command) else None
         #: What the master has sent last, and the place of it in the dialogue.
         self.sent = request
         self.sent_as = -1
@@ -341,7 +341,7 @@ class Monitor:
     def _awaited(self, pending: _Pending, dialogue: Progress, now: float) -> float:
         """Return the time until which an answer is due in a dialogue; nothing is late if the master is."""
         pending.reported = dialogue.sends
-        step = pending.command.steps[dialogue.at]
+        step = steps_of(pending.command)[dialogue.at]
         return now + self._timing.step(step)
 
     def _asked(self, request: Framed, now: float) -> None:
@@ -366,6 +366,7 @@ class Monitor:
         pending.answered = pending.reported = unanswerable
         if unanswerable:
             self._stop(request)
+            pending.dialogue = None
         if pending.dialogue is not None:
             pending.reported = pending.dialogue.sends
         self.heard.append(Asked(now, request, repeat, self._codec.encode(request)))

@@ -9,6 +9,7 @@ from qlinkgen.errors import LinkError
 from qlinkgen.link.codec import Command, Framed
 from qlinkgen.link.dialogue import Dialogue
 from qlinkgen.link.timing import Timing
+from qlinkgen.link.turn import steps_of
 
 
 @final
@@ -63,7 +64,8 @@ class CommandTiming:
         self.replies = command.replies
         #: Class of the response if it answers in any case, whatever is in it, and is the only one.
         self.plain = command.response
-        if command.many is not None or command.steps or command.response in command.replies:
+        steps = steps_of(command)
+        if command.many is not None or steps or command.response in command.replies:
             self.plain = None
         self.many = command.many
         self.answers_broadcast = command.addressing == "answered_broadcast"
@@ -71,7 +73,7 @@ class CommandTiming:
         self.answer_time = timing.deadline(command, 0)
         self.tries = timing.attempts_of(command)
         #: Time until each frame of a dialogue after its request, or after the one before it.
-        self.step_times = tuple(timing.step(step) for step in command.steps)
+        self.step_times = tuple(timing.step(step) for step in steps)
 
 
 def settled(outcome: Reply | LinkError | None) -> Reply:

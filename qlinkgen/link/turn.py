@@ -1,10 +1,11 @@
-"""Frames that only their turn in a dialogue tells: their bytes go to their message, not to the decoder."""
+"""Frames that only their turn tells: their bytes go to their message, not to the decoder."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
-from qlinkgen.link.codec import Command, Framed, Message
+from qlinkgen.link.codec import Command, Framed, Message, StepSpan
 
 if TYPE_CHECKING:
     from typing_extensions import TypeIs
@@ -36,9 +37,17 @@ def is_turned(kind: type[Message] | None) -> TypeIs[type[Turned]]:
     return getattr(kind, "TURN", None) is not None
 
 
+def steps_of(command: Command) -> Sequence[tuple[str, type[Framed], StepSpan | None]]:
+    """The frames after a request, as in `Command.steps`; a response that only its turn tells is one, too."""
+    if command.steps or not is_turned(command.response):
+        return command.steps
+    within = (command.response_byte_times, command.response_seconds)
+    return (("receive", command.response, within),)
+
+
 def has_turns(command: Command) -> bool:
-    """Whether only their turn tells some frames of a dialogue."""
-    return any(is_turned(kind) for _, kind, _ in command.steps)
+    """Whether only their turn tells some frames of a transaction."""
+    return any(is_turned(kind) for _, kind, _ in steps_of(command))
 
 
 class Collected:

@@ -64,6 +64,7 @@ def build_kinds(file: SchemaFile, builder: FrameBuilder, report: Reporter) -> Fr
     ways = [(name, frame, way) for name, frame, only in built for way in _ways(frame, only)]
     families = list(dict.fromkeys((name if name in named else "", way) for name, _, way in ways))
     steps = sum(1 for name, spec in file.commands.items() for _ in own_steps(name, spec))
+    steps += sum(1 for spec in file.commands.values() if spec.steps is None and spec.response != "none")
     kinds = FrameKinds(
         tuple(
             FrameKind(
@@ -150,9 +151,12 @@ def check_used(file: SchemaFile, kinds: FrameKinds, messages: list[Message], rep
     for kind in kinds.kinds:
         carried = [each for each in messages if kind in kinds.carrying(each.id)]
         for message in carried:
-            if kind.frame.is_payload and message.name not in steps:
-                what = f"{message.name} is not a step, and nothing but its turn tells a frame of {kind.name}"
-                hint = "let only steps have this kind, or begin it with a constant or the message id"
+            response = f"{message.command}.response"
+            if kind.frame.is_payload and message.name not in steps and message.name != response:
+                what = f"{message.name} is neither a response nor a step, and nothing but its turn tells"
+                what += f" a frame of {kind.name}"
+                hint = "let only responses and steps have this kind, or begin it with a constant or the"
+                hint += " message id"
                 report.error(_RULE, ("frames", kind.name), what, hint, of_key=True)
         _check_asking(kinds, kind, [each for each in carried if each.direction != "response"], report)
 

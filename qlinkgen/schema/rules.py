@@ -385,7 +385,8 @@ _ALL = (
     Rule(
         "bad-steps",
         "The steps of a dialogue follow its request in order; each is one frame, and one of them answers.",
-        "Both sides follow the same list, without loops or choices, and one request goes to one node.",
+        "Both sides follow the same list, without loops or choices, and one request goes to one node. "
+        "So it is with a response that only its turn tells.",
     ),
     Rule(
         "bad-fixed",

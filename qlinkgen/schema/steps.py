@@ -88,7 +88,11 @@ class StepBuilder:
 
     def build(self, asked: Asked) -> tuple[Step, ...]:
         """The steps of a command after its request."""
-        if not asked.spec.steps or not self._may_have(asked):
+        if not asked.spec.steps:
+            if asked.response is not None and self._messages.turned(asked.response):
+                self._may_have(asked)  # the master waits for it as for that of a dialogue
+            return ()
+        if not self._may_have(asked):
             return ()
         self._check_names(asked)
         own = {step.path[-1]: step for step in own_steps(asked.name, asked.spec)}
@@ -114,7 +118,7 @@ class StepBuilder:
     def _may_have(self, asked: Asked) -> bool:
         """Whether a command may have steps; reports why not."""
         several = asked.addressing not in ("node", "none")
-        spec, path = asked.spec, asked.path
+        spec, path = asked.spec, asked.path if asked.spec.steps else (*asked.path[:-1], "response")
         echo = ", ".join(self._messages.numbered)
         faults = {
             "many": (spec.many is not None, "it has several answers", "write each as a step, or remove many"),
@@ -140,6 +144,8 @@ class StepBuilder:
             if wrong:
                 needs = (path, (key,) if key in ("bus", "frame") else (*path[:-1], key), ("frame",))
                 what = f"{asked.name} cannot be a dialogue of several frames: {why}"
+                if not asked.spec.steps:
+                    what = f"only its turn tells the response of {asked.name}, which it cannot: {why}"
                 self._report.error(_RULE, path, what, hint, of_key=True, needs=needs)
                 return False
         return True

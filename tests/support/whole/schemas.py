@@ -211,6 +211,10 @@ class _Maker:
             del steps[-1], command["response"]
             steps += [{"name": "amount", "send": asked, "within": "1 s"}, {"receive": told}]
         given = [each for step in steps for each in step.values() if isinstance(each, dict)]
+        for other in (each for each in fit if "steps" not in each):
+            if rng.random() < 0.5:
+                other["response"] = {"frame": name, "fields": makes.fields(Room.of(shape)) or {"data": "u16"}}
+                given.append(other["response"])
         if any(each.get("frame") == name for each in given):
             several.frames[name] = {"parts": {"data": {"role": "payload", "size": f"1..{most}"}}}
 
@@ -686,7 +690,7 @@ def _begin_with_break(rng: random.Random, document: Doc) -> None:
     )
     if not name or "to_unknown" in document or rng.random() < 0.6:
         return
-    answered = any(spec["response"] != "none" for spec in document.get("commands", {}).values())
+    answered = any(spec.get("response") != "none" for spec in document.get("commands", {}).values())
     if not (parts[name].get("alone") and answered):
         first = {name: parts.pop(name) | {"role": "break"}}
         document["frame"]["parts"] = first | parts
