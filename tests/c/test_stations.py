@@ -133,7 +133,7 @@ static uint8_t next[2] = {MBUS_MASTER_FIRST_NUMBER, MBUS_MASTER_FIRST_NUMBER};
 static void show(size_t node, uint32_t id)
 {
     mbus_parts_t parts = MBUS_PARTS_INIT;
-    uint8_t wire[MBUS_MAX_WIRE_SIZE];
+    uint8_t wire[MBUS_MAX_WIRE_SIZE] = {0};
     int size;
     mbus_master_number(&next[node], id, &parts);
     size = (id == MBUS_READ_REQUEST_ID)

@@ -74,7 +74,9 @@ class CheckWriter(Places):
     @property
     def lead_updates(self) -> list[str]:
         """Statements that update the only check value with the lead, none if it is not covered."""
-        return self._lead_updates(self.alone, "check") if self.alone else []
+        if self.alone is None:
+            return []
+        return self._lead_updates(self.alone, self.algorithms[self.alone.check.algorithm].key)
 
     def _lead_updates(self, check: CheckPart, key: str) -> list[str]:
         covered = self.lead and self.envelope.parts[0].name in check.check.over

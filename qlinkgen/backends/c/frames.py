@@ -8,7 +8,6 @@ from typing import assert_never
 
 from qlinkgen.backends.c import crc, framing
 from qlinkgen.backends.c.checks import condition
-from qlinkgen.backends.c.coding import EndedView
 from qlinkgen.backends.c.kinds import KindsView, kinds_views
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.marked import PLACE, MarkedView, Shapes, marked_view, shape
@@ -24,13 +23,8 @@ from qlinkgen.backends.c.packet import (
 )
 from qlinkgen.backends.c.views import (
     FrameView,
-    HuntView,
-    InsertView,
-    PartsView,
+    OtherView,
     PartsViews,
-    PlaceView,
-    PlainView,
-    StuffedView,
     frame_view,
     judgement,
     own_prefix,
@@ -44,19 +38,7 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 ReceivedMessages = Sequence[tuple[Direction, Sequence[MessagePlan]]]
 
 #: Views of the templates of one kind of frame, in addition to `FrameView`.
-View = (
-    PlaceView
-    | KindsView
-    | PartsView
-    | PlainView
-    | StuffedView
-    | InsertView
-    | HuntView
-    | EndedView
-    | MarkedView
-    | PacketView
-    | None
-)
+View = OtherView | KindsView | MarkedView | PacketView | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +66,8 @@ class FrameSection:
     receiver: str
     #: The views of the frames of each direction, if they differ.
     ways: Mapping[str, PartsViews] = field(default_factory=dict)
+    #: The views of each kind of frame, if there are several.
+    kinds: Mapping[str, PartsViews] = field(default_factory=dict)
 
     @property
     def check(self) -> crc.CheckView | None:
@@ -210,32 +194,35 @@ def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
         several = kinds_views(plan, layouts)
         found: Mapping[str, View] = {
             "kinds": several.kinds,
+            "place": several.place,
             "parts": several.parts,
             "ended": None,
             "coded": None,
-            "inserted": None,
+            "stuffed": None,
+            "crc": None,
         }
-        templates: tuple[str, ...] = ("kinds", "wrap", "frame_public")
-        return FrameSection(plan, several.f, found, several.algorithms, templates, "receiver_rescan")
+        templates: tuple[str, ...] = ("place", "kinds", "wrap", "frame_public")
+        algorithms = next(iter(several.each.values())).algorithms
+        return FrameSection(
+            plan, several.f, found, algorithms, templates, "receiver_rescan", kinds=several.each
+        )
     receiver, check = plan.frame.receiver, plan.frame.check
     match receiver:
         case Hunt() | Rescan() | Gaps():
             ways = parts_views(plan, layouts)
             views = _common(plan, ways) if plan.directed else ways[""]
-            frame = "frame_stuffed" if views.stuffed else "frame_plain"
-            templates = ("place", "values", frame, "wrap", "frame_public")
-            if views.ended:
-                made = ("coding", "wrap_coded") if views.ended.stages else ("frame_plain",)
-                templates = ("place", "values", *made, "scan_ended", "wrap", "frame_public")
-            if views.coded:
-                templates = ("place", "values", "coding", "wrap_coded", "scan_coded", "wrap", "frame_public")
+            templates = (*views.templates, "wrap", "frame_public")
             kind = _RECEIVERS[type(receiver)]
             templates = (*templates[:-1], "ways", templates[-1]) if plan.directed else templates
             each = ways if plan.directed else {}
             return FrameSection(plan, views.f, views.others, views.algorithms, templates, kind, each)
         case Marks():
             value = [crc.render(check.algorithm)] if check else []
-            marked: Mapping[str, View] = {"place": PLACE, "marked": marked_view(plan)}
+            marked: Mapping[str, View] = {
+                "place": PLACE,
+                "marked": marked_view(plan),
+                "crc": value[0] if value else None,
+            }
             view = frame_view(plan, check_optional=bool(check))
             return FrameSection(plan, view, marked, value, ("place", "marked", "wrap"), "receiver_marked")
         case InStep():

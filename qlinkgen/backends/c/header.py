@@ -117,6 +117,7 @@ class Header:
             self._check_value(),
             self._place("frame_common", f=self._section.view, beside=self._beside()),
             *self._directions(),
+            *self._kinds(),
             *[text for name in self._section.templates for text in self._frame_parts(name)],
             *[self._record(layout) for layout in plan.layouts],
             *[self._message(message) for message in self._plan.messages],
@@ -130,9 +131,16 @@ class Header:
     # Sections
 
     def _place(self, template: str, **views: object) -> str:
+        prefix = self._names.prefix
         return self._templates.get_template(f"templates/{template}.h.j2").render(
-            p=self._names.prefix, P=self._names.upper, **{"q": self._names.prefix, **views}
+            P=self._names.upper, **{"p": prefix, "q": prefix, "t": prefix, **views}
         )
+
+    def _kinds(self) -> Iterator[str]:
+        """The functions of each kind of frame, if there are several."""
+        for kind, views in self._section.kinds.items():
+            for template in views.templates:
+                yield self._frame_part(template, views.f, views.others, kind)
 
     def _frame_parts(self, template: str) -> Iterator[str]:
         """The text of a template, for each direction if it is about what differs between their frames."""
@@ -144,13 +152,16 @@ class Header:
             yield self._frame_part(template, views.f, views.others, way)
 
     def _frame_part(self, template: str, view: FrameView, views: Mapping[str, View], way: str = "") -> str:
-        section = self._section
+        section, own = self._section, own_prefix(self._names.prefix, way)
+        # Codings are the same in both directions, but not in each kind of frame.
+        coding = own if section.kinds else self._names.prefix
         return self._place(
             template,
-            q=own_prefix(self._names.prefix, way),
+            q=own,
+            t=coding,
+            p=coding if template == "coding" else self._names.prefix,
             f=view,
             ways={each: found.f for each, found in section.ways.items()},
-            crc=section.check,
             unused=self._unused_arguments(),
             wide=self._wide,
             address_groups=self._address_groups(way),

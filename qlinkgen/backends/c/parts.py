@@ -185,7 +185,8 @@ class PartWriter(CheckWriter):
                     yield from (f"    {line}" for line in self._announced(part, all_there=all_there))
                     yield "}"
                 case IdPart() if part.numbers:
-                    test = f"!{self.prefix}_begins_{self.frame.name}_(body, {counted})"
+                    test = f"!{self.own}_begins_(body, {counted})"
+                    test = test if all_there else f"({counted} <= {end}U) && {test}"
                     yield from refusal(test, f"{self.prefix.upper()}_ERROR_FRAME")
                 case IdPart() | AddressPart() | CellPart() | EqualPart():
                     yield from self._number_checks(part, f"{reached}{end}U", directed)

@@ -162,7 +162,7 @@ class PartsView:
         judged: without a check value, only valid contents confirm a frame; the condition, "" if there is one.
         values: functions for check values, none if the only one is computed in passing.
         judges: statements that verify them.
-        inline: the only check value is computed in passing.
+        most: maximum size of a payload.
         identified_late: message id or address follow the payload.
         unused: the parameter for the message id if frames have none, otherwise "".
         refused_values: conditions that hold if a value of the frame cannot be sent.
@@ -175,6 +175,7 @@ class PartsView:
     tail: int
     header: int
     overhead: int
+    most: str
     max_frame: str
     index_type: str
     id_value: str
@@ -183,7 +184,6 @@ class PartsView:
     check_differs: str
     values: list[ValueView]
     judges: list[str]
-    inline: bool
     blocks: BlocksView | None
     identified_late: bool
     unused: str
@@ -294,11 +294,36 @@ class HuntView:
     before_check: str
 
 
+@dataclass(frozen=True, slots=True)
+class BeginsView:
+    """The message ids that frames of a kind begin with, as rows of bytes."""
+
+    starts: Sequence[str]
+    size: int
+
+
+OtherView = (
+    CheckView
+    | PlaceView
+    | PartsView
+    | PlainView
+    | StuffedView
+    | InsertView
+    | HuntView
+    | EndedView
+    | BeginsView
+)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartsViews:
-    """All views of a delimited frame, by name in templates; None if one does not apply."""
+    """All views of a delimited frame, by name in templates; None if one does not apply.
+
+    ``crc`` is the algorithm of the only check value, None if there are several or none.
+    """
 
     algorithms: Sequence[CheckView]
+    crc: CheckView | None
     f: FrameView
     place: PlaceView
     parts: PartsView
@@ -308,15 +333,29 @@ class PartsViews:
     hunt: HuntView | None
     ended: EndedView | None
     coded: EndedView | None
+    begins: BeginsView | None = None
+    turned: bool = False
 
     @property
-    def others(
-        self,
-    ) -> Mapping[
-        str, PlaceView | PartsView | PlainView | StuffedView | InsertView | HuntView | EndedView | None
-    ]:
+    def templates(self) -> tuple[str, ...]:
+        """The templates of the functions that wrap a frame and find one; nothing looks for a turned one."""
+        if self.turned:
+            return "place", "wrap_plain"
+        made: tuple[str, ...] = ("wrap_plain", "scan_plain")
+        if self.stuffed:
+            made = ("wrap_stuffed", "scan_stuffed")
+        elif self.ended:
+            made = (*(("coding", "wrap_coded") if self.ended.stages else ("wrap_plain",)), "scan_ended")
+        elif self.coded:
+            made = ("coding", "wrap_coded", "scan_coded")
+        return ("place", *(("begins",) if self.begins else ()), "values", *made)
+
+    @property
+    def others(self) -> Mapping[str, OtherView | None]:
         """All views except `f`."""
         return {
+            "crc": self.crc,
+            "begins": self.begins,
             "place": self.place,
             "parts": self.parts,
             "plain": self.plain,
@@ -330,54 +369,99 @@ class PartsViews:
 
 def parts_views(whole: Plan, layouts: Layouts) -> dict[str, PartsViews]:
     """The views of a delimited frame for each direction; "" if both have the same."""
-    return {way: _parts_views(whole, plan, way, layouts) for way, plan in whole.ways.items()}
+    found = {}
+    for way, plan in whole.ways.items():
+        writer = _writer(whole, plan.frame, way, layouts)
+        body_size = _body_size(writer)
+        frame = frame_view(whole, plan.frame, body_size=body_size, max_wire=plan.frame.max_wire)
+        found[way] = _parts_views(writer, frame)
+    return found
 
 
-def _parts_views(whole: Plan, plan: Plan, way: str, layouts: Layouts) -> PartsViews:
-    seeds = seeds_of(plan)
-    sender = sender_of(plan.frame, plan.protocol.name)
-    prefix, passes = plan.protocol.name, directed(whole)
-    every = (whole.frame.envelope, *([whole.frames["request"].envelope] if way else []))
-    own = own_prefix(prefix, way)
-    writer = PartWriter(prefix, plan.frame, sender, layouts, seeds, passes, own, every)
-    envelope, receiver, transparency = plan.frame.envelope, plan.frame.receiver, plan.frame.transparency
-    rule, body_size, added = None, 0, ""
+def kind_views(whole: Plan, kind: FramePlan, every: FrameView, layouts: Layouts) -> PartsViews:
+    """The views of one of several kinds of frame; ``every`` is that of all."""
+    writer = _writer(whole, kind, kind.name, layouts)
+    frame = replace(
+        every,
+        parameters=writer.sender.parameters,
+        direction_unused=every.needs_direction and not _uses_direction(kind),
+        sized_by_message=isinstance(kind.end, ByMessage),
+        body_size=_body_size(writer),
+    )
+    views = _parts_views(writer, frame)
+    starts = () if kind.envelope.preamble else kind.envelope.starts
+    rows = [f"{{{', '.join(map(in_hex, start))}}}" for start in starts]
+    return replace(
+        views,
+        parts=replace(views.parts, most=f"{kind.max_payload}U"),
+        begins=BeginsView(rows, len(starts[0])) if starts else None,
+        turned=kind.turned,
+    )
+
+
+def _writer(whole: Plan, frame: FramePlan, way: str, layouts: Layouts) -> PartWriter:
+    """Prints the parts of a frame; ``way`` is its kind or its direction, "" if there is one frame."""
+    prefix = whole.protocol.name
+    every = {"response": whole.frame, **({"request": whole.frames["request"]} if way else {})}
+    if whole.frame.kinds:
+        every = {each.name: each for each in whole.frame.kinds}
+    return PartWriter(
+        prefix,
+        frame,
+        sender_of(frame, prefix),
+        layouts,
+        seeds=seeds_of(whole),
+        directed=directed(whole),
+        own=own_prefix(prefix, way),
+        every=tuple(each.envelope for each in every.values()),
+        id_bits=id_bits(whole.frame) if whole.frame.kinds else 0,
+    )
+
+
+def _body_size(writer: PartWriter) -> int:
+    """Size of the buffer for decoding a frame, 0 if its bytes are sent as they are."""
+    envelope, transparency = writer.envelope, writer.frame.transparency
     match transparency:
         case Plain():
-            body_size = envelope.payload.most if envelope.blocks else 0
+            return envelope.payload.most if envelope.blocks else 0
         case PayloadStuffing():
-            coding, body_size = transparency.rule, envelope.payload.most_sent
-            rule = coding if isinstance(coding, Insertion) else None
-            added = in_hex(coding.number) if isinstance(coding, Add) else ""
+            return envelope.payload.most_sent
         case FrameStuffing():
-            rule, body_size = transparency.rule, writer.head + envelope.trailer_size + envelope.payload.most
+            return writer.head + envelope.trailer_size + envelope.payload.most
         case Coded():
-            size = envelope.overhead + envelope.payload.most
-            body_size = size if transparency.stages else 0
+            return envelope.overhead + envelope.payload.most if transparency.stages else 0
         case SevenBit():
             raise AssertionError("a marked frame has no parts that a length or its message ends")
         case _:
             assert_never(transparency)
-    stuffing = writer.stuffing
-    frame = frame_view(whole, plan.frame, body_size=body_size, max_wire=plan.frame.max_wire)
+
+
+def _parts_views(writer: PartWriter, frame: FrameView) -> PartsViews:
+    envelope, receiver, transparency = writer.envelope, writer.frame.receiver, writer.frame.transparency
+    rule, added = None, ""
+    if isinstance(transparency, PayloadStuffing | FrameStuffing):
+        rule = transparency.rule if isinstance(transparency.rule, Insertion) else None
+        added = in_hex(transparency.rule.number) if isinstance(transparency.rule, Add) else ""
+    stuffing, alone = writer.stuffing, writer.alone
     passed = frame.pass_decode_direction
     return PartsViews(
         algorithms=list(writer.algorithms.values()),
+        crc=writer.algorithms[alone.check.algorithm] if alone else None,
         f=frame,
         place=PlaceView(
-            tailed=rule is not None or (body_size > 0 and not added) or envelope.before is not None,
+            tailed=rule is not None or (frame.body_size > 0 and not added) or envelope.before is not None,
             tail=envelope.trailer_size - (envelope.after.size if envelope.after else 0),
             header=envelope.header_size,
             overhead=envelope.least_overhead,
         ),
-        parts=parts_view(writer, plan.frame.max_wire),
+        parts=parts_view(writer, writer.frame.max_wire),
         plain=None if stuffing else replace(plain_view(writer, passed), added=added),
         stuffed=_stuffed(writer, stuffing, passed) if stuffing else None,
         inserted=_inserted(rule) if rule else None,
         hunt=_hunted(writer, receiver) if isinstance(receiver, Hunt) else None,
-        ended=ended_view(writer, passed) if plan.frame.whole else None,
+        ended=ended_view(writer, passed) if writer.frame.whole else None,
         coded=None
-        if plan.frame.whole or not isinstance(transparency, Coded)
+        if writer.frame.whole or not isinstance(transparency, Coded)
         else replace(
             ended_view(writer, passed), head_checks=list(writer.head_checks("at", passed, all_there=False))
         ),
@@ -399,15 +483,15 @@ def parts_view(writer: PartWriter, max_wire: int) -> PartsView:
         tail=envelope.trailer_size,
         header=envelope.header_size,
         overhead=envelope.overhead,
+        most=f"{writer.prefix.upper()}_MAX_PAYLOAD_SIZE",
         max_frame=f"{writer.frame.longest}U",
         index_type=unsigned_type(max(16, max_wire.bit_length())),
-        id_value=writer.number(envelope.id),
+        id_value=writer.message_id(writer.number(envelope.id)),
         address_value=writer.number(envelope.address),
         wrong_tail=writer.wrong_tail("end"),
         check_differs=writer.check_differs("end", "value"),
         values=writer.values,
         judges=writer.judges("body", "end", f"{'sent' if writer.blocks else 'payload'} + {writer.head_text}"),
-        inline=writer.alone is not None,
         blocks=writer.blocks,
         identified_late=writer.reads_tail,
         unused="" if envelope.id else writer.sender.id,
