@@ -55,11 +55,14 @@ class CoordinatorNode:
     def __init__(self, **options: Unpack[NodeOptions]) -> None:
         """Make a node; the options are those of `RingNode`."""
         options.setdefault("codec", trio)
-        self.link = RingNode(on_message=self._handle, **options)
+        self.link = self._make_link(**options)
         self.vr = Variables()
         self.keys = KeyTable()
         self.received: deque[str] = deque()
         self.counters = CoordinatorCounters()
+
+    def _make_link(self, **options: Unpack[NodeOptions]) -> RingNode:
+        return RingNode(on_message=self._handle, **options)
 
     def reset(self) -> None:
         """Switch off and on: messages being sent and received data are lost; variables are kept."""
