@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain, islice
 
 from tests.support.whole.reference import Raw, Reference
 from tests.support.whole.reference.frames import Frame
@@ -143,8 +144,9 @@ def _ended(
     """The records, of which only the last one ends the array; a default record ends it."""
     others: list[dict[str, Raw]] = []
     for record in records[:-1]:
-        tries = (record, *(_record(kind.record, rng, mark) for _ in range(20)))
-        others += [each for each in tries if not meets(kind, each) and not takes_rest(kind, each)][:1]
+        tries = _tries(kind, record, rng, mark)
+        fit = (each for each in tries if not meets(kind, each) and not takes_rest(kind, each))
+        others += islice(fit, 1)
     return [*others, records[-1] if meets(kind, records[-1]) else default_record(kind.record)]
 
 
@@ -154,9 +156,16 @@ def _closed(
     """The records, of which only the last one takes all bytes that are left; a default record does not."""
     others: list[dict[str, Raw]] = []
     for record in records[:-1]:
-        tries = (record, *(_record(kind.record, rng, mark) for _ in range(20)), default_record(kind.record))
-        others += [each for each in tries if not takes_rest(kind, each)][:1]
+        tries = chain(_tries(kind, record, rng, mark), [default_record(kind.record)])
+        others += islice((each for each in tries if not takes_rest(kind, each)), 1)
     return [*others, *records[-1:]]
+
+
+def _tries(kind: Records, record: dict[str, Raw], rng: random.Random, mark: int) -> Iterator[dict[str, Raw]]:
+    """A record, then others, which are drawn when they are asked for."""
+    yield record
+    for _ in range(20):
+        yield _record(kind.record, rng, mark)
 
 
 def _number(kind: Number, rng: random.Random, mark: int) -> int:
