@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler, StrictBool
@@ -18,6 +19,17 @@ class FileMapping(BaseModel):
     """One mapping of a schema file: other keys than its own are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+
+def nested(node: BaseModel) -> Iterator[tuple[str, str, object]]:
+    """The attributes of a mapping that hold mappings or lists: name, key in the file, value.
+
+    Most attributes hold a single value or nothing, so a walk through a file passes over them here.
+    """
+    fields = type(node).model_fields
+    for name, value in node.__dict__.items():
+        if isinstance(value, BaseModel | dict | list):
+            yield name, fields[name].alias or name, value
 
 
 class Fact(FileMapping):

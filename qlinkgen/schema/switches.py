@@ -12,6 +12,7 @@ from typing import TypeVar
 
 from pydantic import BaseModel
 
+from qlinkgen.schema.file_base import nested
 from qlinkgen.schema.file_fields import CaseOf, ChoiceSpec, FieldSpec, RecordSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.notation import TestText, Wanted, wanted
@@ -69,9 +70,8 @@ class _Rewriter:
         """A node of the file without choices in it."""
         if isinstance(node, BaseModel):
             changed: dict[str, object] = {}
-            for name, field in type(node).model_fields.items():
-                before = getattr(node, name)
-                after = self.rewritten(before, (*path, field.alias or name))
+            for name, key, before in nested(node):
+                after = self.rewritten(before, (*path, key))
                 if after is not before:
                     changed[name] = after
             return node.model_copy(update=changed) if changed else node

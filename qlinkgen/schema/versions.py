@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from pydantic import BaseModel
 
-from qlinkgen.schema.file_base import Lifetime
+from qlinkgen.schema.file_base import Lifetime, nested
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.notation import Version
 from qlinkgen.schema.report import Reporter
@@ -55,9 +55,11 @@ def _lives(spec: object, version: Version | None) -> bool:
 
 def _pruned(node: _T, version: Version | None) -> _T:
     if isinstance(node, BaseModel):
-        values = {name: getattr(node, name) for name in type(node).model_fields}
-        pruned = {name: _pruned(each, version) for name, each in values.items()}
-        changed: dict[str, object] = {name: new for name, new in pruned.items() if new is not values[name]}
+        changed: dict[str, object] = {}
+        for name, _, before in nested(node):
+            after = _pruned(before, version)
+            if after is not before:
+                changed[name] = after
         changed |= _noted(node, version)
         return node.model_copy(update=changed) if changed else node
     if isinstance(node, Mapping):
@@ -86,8 +88,8 @@ def _lifetimes(node: object, path: Path) -> Iterator[tuple[Path, Lifetime]]:
     if isinstance(node, Lifetime):
         yield path, node
     if isinstance(node, BaseModel):
-        for name, field in type(node).model_fields.items():
-            yield from _lifetimes(getattr(node, name), (*path, field.alias or name))
+        for _, key, each in nested(node):
+            yield from _lifetimes(each, (*path, key))
     elif isinstance(node, Mapping):
         for name, each in node.items():
             yield from _lifetimes(each, (*path, name))
