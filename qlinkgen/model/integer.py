@@ -98,7 +98,7 @@ class Integer:
     #: Its digits, or the words for it, if it is sent as text; it has no chunks then.
     text: TextForm | None = None
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Bytes on the wire, the maximum of a text."""
         return self.text.most if self.text else len(self.chunks)
@@ -111,13 +111,13 @@ class Integer:
         form = f" {self.text}" if self.text else " bcd" if self.bcd else ""
         return f"{'i' if self.signed else 'u'}{self.bits}{form}"
 
-    @property
+    @cached_property
     def minimum(self) -> int:
         """Minimum value that the bits can hold."""
         least = -(1 << (self.bits - 1)) if self.signed else 0
         return max(least, self.text.lowest) if self.text else least
 
-    @property
+    @cached_property
     def maximum(self) -> int:
         """Maximum value that the bits can hold."""
         if self.bcd:
@@ -125,7 +125,7 @@ class Integer:
         most = (1 << (self.bits - self.signed)) - 1
         return min(most, self.text.highest) if self.text else most
 
-    @property
+    @cached_property
     def mask(self) -> int:
         """All bits set."""
         return (1 << self.bits) - 1
@@ -145,12 +145,21 @@ class Integer:
             raise ValueError(f"{value} does not fit {self.bits} bits")
         if self.text:
             return self.text.text(value)
+        if self.byteorder and not self.bcd:
+            return (value & self.mask).to_bytes(self.size, self.byteorder)
         return pack_chunks(int(str(value), 16) if self.bcd else value, self.chunks)
 
     def unpack(self, data: bytes) -> int:
-        """The value in its wire bytes; unused bits and wrong digits are not refused, see `stray`."""
+        """The value in its wire bytes; unused bits and wrong digits are not refused, see `stray`.
+
+        Raises ValueError for another number of bytes.
+        """
         if self.text:
             return self.text.number(data) or 0
+        if self.byteorder and not self.bcd:
+            if len(data) != self.size:
+                raise ValueError(f"{len(data)} bytes are not {self.bits} bits")
+            return int.from_bytes(data, self.byteorder, signed=self.signed)
         pattern = unpack_chunks(data, self.chunks)
         if self.bcd:
             return sum((pattern >> 4 * place & 0xF) * 10**place for place in range(self.bits // 4))

@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import TypeAlias, assert_never
 
 from qlinkgen.model.integer import Integer, pack_row, unpack_row
-from qlinkgen.model.types import Scalar
 from qlinkgen.plan import walk
 from qlinkgen.plan.expr import Condition
 from qlinkgen.plan.openings import are_closed
@@ -38,7 +37,6 @@ from qlinkgen.plan.payload import (
     Step,
     ValueStep,
     holders,
-    limits,
     term_of,
     value_name,
 )
@@ -123,7 +121,9 @@ def _pack_separated(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
 
 def _by_case(plan: PayloadPlan, values: Mapping[str, Raw]) -> dict[str, Raw]:
     """The values by field: that of a choice belongs to the case that is sent. Raises Unsendable."""
-    given = {**defaults(plan), **values}
+    given = values
+    if any(value_name(each) not in values for each in plan.settable):
+        given = {**defaults(plan), **values}
     numbers = {name: value for name, value in given.items() if isinstance(value, int)}
     found: dict[str, Raw] = {}
     left: dict[str, Raw] = {}
@@ -153,11 +153,12 @@ def by_value(plan: PayloadPlan, found: Mapping[str, Raw]) -> dict[str, Raw]:
 
 
 def _pack_walked(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
-    data, left_out, sizes = b"", False, _sizes(plan, values)
+    data, left_out, counted = b"", False, _counted(plan, values)
+    sizes = {each.name: {each.run: _size_of(plan, each.run, counted)} for each in plan.byte_counts}
     numbers = {name: value for name, value in values.items() if isinstance(value, int)}
     counts = {run.name: 0 if values[run.name] is None else _count(run, values[run.name]) for run in plan.runs}
     for segment in plan.segments:
-        given = [values[each.name] is not None for each in holders(segment.steps)]
+        given = [values[each.name] is not None for each in segment.settable]
         if segment.presence is not None and segment.presence.optional:
             sent = given[0]
             if sent and left_out:
@@ -165,10 +166,12 @@ def _pack_walked(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
             left_out = not sent
         else:
             sent = present(segment.presence, numbers, 0)
-        for each in holders(segment.steps):
+        for each in segment.settable:
             if (values[each.name] is not None) != sent:
                 raise Unsendable(each.name, values[each.name])
-        data += _segment(segment, values, counts, sizes) if sent else b""
+        if sent:
+            whole = counted.get(segment.steps[0].name)
+            data += _segment(segment, values, counts, sizes) if whole is None else whole
     if len(data) > plan.most:
         long = [step for segment in plan.segments if (step := segment.records)]
         field = next((step for step in long if values[step.name] is not None), long[0])
@@ -196,16 +199,15 @@ def _filled(step: FilledStep, data: bytes, counts: Mapping[str, int]) -> bytes:
     return step.integer.pack(step.value(data[step.begin.value(counts) : step.end.value(counts)]))
 
 
-def _sizes(plan: PayloadPlan, values: Mapping[str, Raw]) -> dict[str, dict[str, int]]:
-    """What counts of bytes of walked records count, by the name of the count and of the records."""
-    counts = [each for each in plan.steps if isinstance(each, CountStep) and each.sized]
-    sizes: dict[str, int] = {}
-    for each in counts:
-        steps = [segment.steps[0] for segment in plan.counted(each.run)]
-        sizes[each.run] = sum(
-            len(_packed(step, values, {})) for step in steps if values[step.name] is not None
-        )
-    return {each.name: {each.run: sizes[each.run]} for each in counts}
+def _counted(plan: PayloadPlan, values: Mapping[str, Raw]) -> dict[str, bytes]:
+    """The fields that are sent and whose bytes a count tells."""
+    counted = (segment.steps[0] for each in plan.byte_counts for segment in plan.counted(each.run))
+    return {step.name: _packed(step, values, {}) for step in counted if values[step.name] is not None}
+
+
+def _size_of(plan: PayloadPlan, name: str, counted: Mapping[str, bytes]) -> int:
+    """The bytes that a count tells."""
+    return sum(len(counted.get(segment.steps[0].name, b"")) for segment in plan.counted(name))
 
 
 def default_of(each: Holder) -> Raw:
@@ -250,7 +252,7 @@ def with_decided(plan: PayloadPlan, values: Mapping[str, Raw]) -> dict[str, Raw]
 def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) -> bytes:  # noqa: C901  # a case a step
     match step:
         case ValueStep():
-            return step.integer.pack(_checked(step.name, step.number, values[step.name]))
+            return step.integer.pack(_checked(step.name, step.limits, values[step.name]))
         case ConstantStep() | ReservedStep():
             return step.integer.pack(step.value)
         case CountStep():
@@ -270,7 +272,7 @@ def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) ->
             items = values[step.name]
             if not isinstance(items, list):  # of another case of a choice
                 raise Unsendable(step.name, items)
-            return pack_items(step, [_checked(step.name, step.number, item) for item in items])
+            return pack_items(step, [_checked(step.name, step.limits, item) for item in items])
         case RecordStep():
             return _record(step.name, step.record, values[step.name])
         case RecordsStep():
@@ -325,11 +327,11 @@ def unpack_items(step: ItemsStep, data: bytes, number: int) -> list[int]:
 
 def member_bits(member: Member, values: Mapping[str, Raw]) -> int:
     """The bits of a value. Raises Unsendable."""
-    return _checked(member.name, member.number, values[member.name]) & member.number.integer.mask
+    return _checked(member.name, member.limits, values[member.name]) & member.number.integer.mask
 
 
-def _checked(name: str, number: Scalar, value: object) -> int:
-    if not isinstance(value, int) or broken(limits(number), value):
+def _checked(name: str, limits: tuple[Condition, ...], value: object) -> int:
+    if not isinstance(value, int) or broken(limits, value):
         raise Unsendable(name, value)
     return value
 

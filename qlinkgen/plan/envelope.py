@@ -52,7 +52,7 @@ class Envelope:
         # What is derived from a part still refers to the same one.
         return replace(self, parts=tuple(_fixing(part, cells) for part in self.parts))
 
-    @property
+    @cached_property
     def conditional(self) -> tuple[Conditional, ...]:
         """The parts that not every frame has."""
         return tuple(each for each in (self.before, self.after) if each is not None)
@@ -78,19 +78,19 @@ class Envelope:
         """Index of the payload among the parts."""
         return next(index for index, part in enumerate(self.parts) if isinstance(part, PayloadPart))
 
-    @property
+    @cached_property
     def payload(self) -> PayloadPart:
         """The payload."""
         part = self.parts[self.payload_at]
         assert isinstance(part, PayloadPart)
         return part
 
-    @property
+    @cached_property
     def front(self) -> tuple[Part, ...]:
         """Parts before the payload."""
         return self.parts[: self.payload_at]
 
-    @property
+    @cached_property
     def back(self) -> tuple[Part, ...]:
         """Parts after the payload."""
         return self.parts[self.payload_at + 1 :]

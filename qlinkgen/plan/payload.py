@@ -84,7 +84,12 @@ class ValueStep:
     number: Scalar
     presence: Presence | None = None
 
-    @property
+    @cached_property
+    def limits(self) -> tuple[Condition, ...]:
+        """Conditions on the integer before it is sent."""
+        return limits(self.number)
+
+    @cached_property
     def conditions(self) -> tuple[Condition, ...]:
         """Conditions on the integer on the wire, beyond the limits of its bits."""
         return conditions(self.number)
@@ -103,7 +108,7 @@ class ConstantStep:
     #: Other values that receivers accept.
     accepted: tuple[int, ...] = ()
 
-    @property
+    @cached_property
     def conditions(self) -> tuple[Condition, ...]:
         """Conditions on the integer on the wire."""
         if not self.accepted:
@@ -215,7 +220,12 @@ class Member:
     number: Scalar
     presence: Presence | None = None
 
-    @property
+    @cached_property
+    def limits(self) -> tuple[Condition, ...]:
+        """Conditions on the number before it is sent."""
+        return limits(self.number)
+
+    @cached_property
     def conditions(self) -> tuple[Condition, ...]:
         """Conditions on the number, beyond the limits of its bits."""
         return conditions(self.number)
@@ -313,7 +323,12 @@ class ItemsStep:
         """Whether the number of items is constant."""
         return self.length.fixed
 
-    @property
+    @cached_property
+    def limits(self) -> tuple[Condition, ...]:
+        """Conditions on each item before it is sent."""
+        return limits(self.number)
+
+    @cached_property
     def conditions(self) -> tuple[Condition, ...]:
         """Conditions on each item, beyond the limits of its bits."""
         return conditions(self.number)
@@ -430,6 +445,11 @@ class Segment:
     size: int | None
     rest: Size | None = None
     counted: bool = False
+
+    @cached_property
+    def settable(self) -> tuple[Holder, ...]:
+        """Steps and members with a value of the message, in wire order."""
+        return holders(self.steps)
 
     @property
     def terminator(self) -> bytes:
@@ -584,6 +604,11 @@ class PayloadPlan:
         ]
         most = min([run.length.maximum, *(_countable(each) for each in counts)])
         return Within(run.length.minimum, most)
+
+    @cached_property
+    def byte_counts(self) -> tuple[CountStep, ...]:
+        """Counts of the bytes of walked records, or of the cases of a choice."""
+        return tuple(step for step in self.steps if isinstance(step, CountStep) and step.sized)
 
     def counted(self, name: str) -> tuple[Segment, ...]:
         """The segments of what a count tells the bytes of: records, or the cases of a choice."""

@@ -26,14 +26,13 @@ from qlinkgen.plan.payload import (
     RunStep,
     Segment,
     Step,
-    holders,
 )
 
 
 def has_member(segment: Segment) -> str:
     """The struct member that tells whether a segment is present, "" if it has none."""
     presence = segment.presence
-    return f"has_{presence.field}" if presence and not presence.slot and holders(segment.steps) else ""
+    return f"has_{presence.field}" if presence and not presence.slot and segment.settable else ""
 
 
 def _in_struct(name: str) -> str:

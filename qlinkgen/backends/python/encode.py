@@ -53,7 +53,6 @@ from qlinkgen.plan.payload import (
     ReservedStep,
     Step,
     ValueStep,
-    limits,
     term_of,
 )
 from qlinkgen.plan.tree import MessagePlan
@@ -183,7 +182,7 @@ class Encoder:
             case CellPart() if (value := self._alone(part)) is not None:
                 source = f"self.{attribute(value.name)}"  # struct checks type and range
                 whole = value.bits == part.integer.bits
-                self._require(source, *(value.conditions if whole else limits(value.number)))
+                self._require(source, *(value.conditions if whole else value.limits))
                 self._integer(part.integer, source)
             case CellPart() | EqualPart():
                 self._lines.append(f"{part.name}_part = {bare(self._part_number(part))}")
@@ -356,7 +355,7 @@ class Encoder:
             self._terms += [f"{barred} not in {octets}" for barred in text.excluded]
             return
         self._lines.append(f"{each.name}_raw = {self.place.use('index')}({source_of(each)})")
-        self._require(f"{each.name}_raw", *limits(each.number))
+        self._require(f"{each.name}_raw", *each.limits)
 
     def _bits(self, step: BitsStep) -> None:
         terms = list(map(self._member, step.members)) or ["0"]

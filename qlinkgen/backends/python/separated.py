@@ -12,7 +12,7 @@ from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.walked import WalkedDecoder, WalkedEncoder
 from qlinkgen.model.integer import Integer
 from qlinkgen.plan.expr import Size, Within
-from qlinkgen.plan.payload import BytesStep, ConstantStep, ItemsStep, ReservedStep, ValueStep, limits
+from qlinkgen.plan.payload import BytesStep, ConstantStep, ItemsStep, ReservedStep, ValueStep
 from qlinkgen.plan.separated import (
     TextStep,
     characters,
@@ -84,7 +84,7 @@ class SeparatedEncoder(WalkedEncoder):
         if step.number.scaling is not None:
             item = f"{self.scales[step.name]}.raw(item)"
         self._terms.append(integers.holds(Within(step.length.minimum, step.length.maximum), f"len({source})"))
-        legal = (integers.holds(rule, "item") for rule in limits(step.number))
+        legal = (integers.holds(rule, "item") for rule in step.limits)
         self._terms += [f"all({each} for item in {step.name}_raw)" for each in legal]
         return [f"{step.name}_raw = [{item} for item in {source}]"]
 

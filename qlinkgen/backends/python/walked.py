@@ -27,7 +27,6 @@ from qlinkgen.plan.payload import (
     Segment,
     Step,
     complete,
-    holders,
 )
 
 
@@ -53,7 +52,7 @@ class WalkedEncoder(Encoder):
             lines += self._segment(segment, before)
             if segment.presence is not None and segment.presence.optional:
                 # The bits of an integer have values of their own, which are given or absent together.
-                before = next((each.name for each in holders(segment.steps)), before)
+                before = next((each.name for each in segment.settable), before)
         if any(segment.records for segment in self.message.payload.segments):
             wrong = f"    raise {self.place.use('OutOfRange')}"
             lines += [f"if len(data) > {self.message.payload.most}:", wrong]
@@ -96,7 +95,7 @@ class WalkedEncoder(Encoder):
         presence = segment.presence
         if presence is None:
             return lines
-        values = [held(each) for each in holders(segment.steps)]
+        values = [held(each) for each in segment.settable]
         if presence.optional:
             given = f"if self.{values[0]} is not None:"
             skipped = (
@@ -242,7 +241,7 @@ class WalkedDecoder(Decoder):
         test = "at < end"
         if not presence.optional:
             test = condition([_python(each) for each in presence.when], "message.{}")
-        absent = [f"message.{held(each)} = None" for each in holders(segment.steps)]
+        absent = [f"message.{held(each)} = None" for each in segment.settable]
         found = [f"if {test}:", *indented(lines)]
         return [*found, "else:", *indented(absent)] if absent else found
 
