@@ -13,11 +13,12 @@ from qlinkgen.cli.arguments import (
     message_argument,
     port_argument,
 )
-from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.boundary import FINE, Failure
 from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.encode import address_option, compose, json_option
 from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, is_shipped, kind_of
 from qlinkgen.cli.send_bus import check_request, further_of, send_on_bus
+from qlinkgen.cli.tracing import Trace, trace_option
 from qlinkgen.cli.wire_options import (
     Parity,
     attempts_option,
@@ -41,6 +42,7 @@ BELONGS: Belongs = {
     "check": (HOST,),
     "stay": (RING,),
     "count": (RING, BUS),
+    "every": (BUS,),
 }
 
 
@@ -85,8 +87,16 @@ BELONGS: Belongs = {
     "--count",
     type=click.IntRange(1),
     metavar="N",
-    help="trio: leave earlier, after N messages for this node. On a bus: stop endless answers after N.",
+    help="trio: leave earlier, after N messages for this node. On a bus: end after N requests of --every, or "
+    "endless answers.",
 )
+@click.option(
+    "--every",
+    callback=seconds,
+    metavar="SECONDS",
+    help="Send it again and again with this period, until Ctrl-C or --count.",
+)
+@trace_option
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
@@ -107,8 +117,10 @@ def command(  # noqa: PLR0917  # click passes them by name
     check: bool,
     stay: float | None,
     count: int | None,
+    every: float | None,
+    traced: bool,
     crc: str | None,
-) -> None:
+) -> int:
     """Send a request on PORT and print the response like decode: one JSON object.
 
     PORT is a device such as /dev/ttyUSB0 or COM3, or a URL such as socket://HOST:PORT. MESSAGE and values are
@@ -117,6 +129,10 @@ def command(  # noqa: PLR0917  # click passes them by name
     The counter of a motion is sent as given. Of a command with steps, --then gives the values of each frame
     after the request, and all answers are printed. Answers that another command stops are printed as they
     come, until Ctrl-C or --count; then that command is sent.
+
+    With --every, each response is an object with "at", the seconds since the start, and a failure is {"at",
+    "error": {"kind", "message"}}; a summary of response times and jitter goes to standard error. A turn
+    is left out while the previous request is pending. Exit code 1 if no request is answered.
 
     On a ring, the command joins as an additional node: it forwards messages, prints those for this node, and
     leaves after --seconds, as soon as it forwards nothing. Delivery of the message is not confirmed. For
@@ -137,30 +153,36 @@ def command(  # noqa: PLR0917  # click passes them by name
     check_options(loaded.name, kind, BELONGS)
     own = _own_codec(protocol, kind)
     codec, found, request = compose(loaded, message, assignments, addresses, object_, codec=own)
-    line = line_of(parity, stop_bits)
+    trace = Trace(loaded, codec) if traced else None
+    line = line_of(parity, stop_bits, trace.hear if trace else None)
     if kind is not RING:
         check_request(loaded, found)
     try:
         request.to_frame()
     except codec.EncodeError as error:
         raise Failure(str(error)) from None
-    if kind is RING:
-        from qlinkgen.cli.send_ring import send_into_ring  # noqa: PLC0415  # only for rings
+    try:
+        if kind is RING:
+            from qlinkgen.cli.send_ring import send_into_ring  # noqa: PLC0415  # only for rings
 
-        send_into_ring(loaded, codec, request, port, seconds=stay, count=count, baud=baud, line=line)
-    elif kind is HOST:
-        from qlinkgen.cli.send_host import send_to_chip  # noqa: PLC0415
+            send_into_ring(loaded, codec, request, port, seconds=stay, count=count, baud=baud, line=line)
+            return FINE
+        if kind is HOST:
+            from qlinkgen.cli.send_host import send_to_chip  # noqa: PLC0415
 
-        send_to_chip(
-            loaded, found, request, port, axis=axis, checksum=checksum, check=check,
-            attempts=attempts, slack=slack, baud=baud, line=line,
-        )  # fmt: skip
-    else:
+            send_to_chip(
+                loaded, found, request, port, axis=axis, checksum=checksum, check=check,
+                attempts=attempts, slack=slack, baud=baud, line=line,
+            )  # fmt: skip
+            return FINE
         further = further_of(loaded, codec, found, addresses, then)
-        send_on_bus(
+        return send_on_bus(
             loaded, codec, request, port, further=further, baud=baud, line=line,
-            attempts=attempts, slack=slack, echo=echo, accepts=matching(protocol), count=count,
+            attempts=attempts, slack=slack, echo=echo, accepts=matching(protocol), count=count, every=every,
         )  # fmt: skip
+    finally:
+        if trace is not None:
+            trace.end()
 
 
 def _own_codec(name: str, kind: Kind) -> ModuleType | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import closing
 from types import ModuleType
 from typing import cast
@@ -10,10 +10,11 @@ from typing import cast
 import click
 
 from qlinkgen.cli import jsonlines
-from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.boundary import FINE, Failure
 from qlinkgen.cli.common import warn
 from qlinkgen.cli.decode import message_record
 from qlinkgen.cli.encode import compose
+from qlinkgen.cli.repeating import answers_of, repeat
 from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.cli.wire_options import Line, counted, echo_mode, open_line, speed
 from qlinkgen.errors import LinkError, Refused
@@ -44,40 +45,54 @@ def send_on_bus(
     echo: str | None,
     accepts: Mapping[str, Accepts] | None,
     count: int | None,
-) -> None:
+    every: float | None,
+) -> int:
     """Send a request and print the response; send a message outside commands without waiting.
 
     ``further`` are the frames of a dialogue after the request; ``count`` of endless answers are printed, None
-    for all of them.
+    for all of them. With ``every``, the request is sent again after so many seconds, ``count`` times.
+    Returns the exit code.
     """
     endless = {command.request.name for command in protocol.commands if command.stopped}
-    if count is not None and request.NAME not in endless:
-        raise Failure(f"--count requires endless answers; {request.NAME} has none: omit it")
+    _check_repetition(protocol, request, every, count, endless)
     with open_line(port, speed(protocol, baud), line) as opened:
         if request.NAME not in {command.request.name for command in protocol.commands}:
             byte_time = codec.BUS.bits_per_byte / opened.baud
             _tell(opened, request.to_frame(), byte_time, break_of(cast("Module", codec), byte_time))
             click.echo(f"qlinkgen: {request.NAME} sent; it has no response", err=True)
-            return
+            return FINE
         timing = timing_of(codec, opened, slack=slack, attempts=attempts)
         engine = MasterEngine(codec, timing, echo=echo_mode(protocol, echo), accepts=accepts)
+        if every is not None:
+            return repeat(protocol, BlockingMaster(engine, opened), codec, request, period=every, count=count)
         try:
             if request.NAME in endless:
                 _follow(protocol, BlockingMaster(engine, opened), request, count)
-                return
+                return FINE
             question = Dialogue(request, further) if further else request
             reply = _transact(protocol, BlockingMaster(engine, opened), question)
         except Refused as refusal:
             click.echo(jsonlines.line(message_record(protocol, cast("Framed", refusal.reply))))
             raise
-    answers = reply.response if type(reply.response) in {list, tuple} else [reply.response]
-    if type(reply.response) is dict:  # by node
-        answers = [answer for answer in reply.response.values() if answer is not None]
-        if missing := [node for node, answer in reply.response.items() if answer is None]:
-            warn(f"no answer of node {', '.join(map(str, missing))}")
-    for answer in answers:
-        if answer is not None:
-            click.echo(jsonlines.line(message_record(protocol, answer)))
+    for answer in answers_of(reply.response):
+        click.echo(jsonlines.line(message_record(protocol, answer)))
+    return FINE
+
+
+def _check_repetition(
+    protocol: Protocol, request: Framed, every: float | None, count: int | None, endless: Collection[str]
+) -> None:
+    """Refuse --count and --every where they do not apply."""
+    name = request.NAME
+    if every is None:
+        if count is not None and name not in endless:
+            raise Failure(f"--count requires --every or endless answers; {name} has none: omit it")
+        return
+    command = next((each for each in protocol.commands if each.request.name == name), None)
+    if every == 0:
+        raise Failure("--every 0: a period is above 0 s; give for example 0.5")
+    if command is None or command.steps or name in endless:
+        raise Failure(f"--every requires a request with its response; {name} is not one: omit it")
 
 
 def _follow(protocol: Protocol, master: BlockingMaster, request: Framed, count: int | None) -> None:

@@ -17,6 +17,7 @@ from qlinkgen.model.values import whole_number
 from qlinkgen.plan.framing import frame_plan
 from qlinkgen.transport.opening import open_port
 from qlinkgen.transport.port import Ability, Port
+from qlinkgen.transport.traced import Hear, TracedPort
 
 #: Speed of a port without line time, such as a pty; it has no effect.
 ANY_SPEED = 115200
@@ -69,10 +70,11 @@ Parity = Literal["none", "even", "odd"]
 
 
 class Line(NamedTuple):
-    """Byte format on the line."""
+    """How to open a line: its byte format, and a function that is told of all bytes."""
 
     parity: Parity = "none"
     stop_bits: Literal[1, 2] = 1
+    hear: Hear | None = None
 
 
 parity_option = click.option(
@@ -91,17 +93,18 @@ stop_bits_option = click.option(
 )
 
 
-def line_of(parity: Parity, stop_bits: str) -> Line:
+def line_of(parity: Parity, stop_bits: str, hear: Hear | None = None) -> Line:
     """Return the byte format of the options."""
-    return Line(parity, 2 if stop_bits == "2" else 1)
+    return Line(parity, 2 if stop_bits == "2" else 1, hear)
 
 
 def open_line(name: str, baud: int, line: Line = Line()) -> Port:  # noqa: B008  # immutable
     """Open a port. Raises PortError, and Failure for an invalid name."""
     try:
-        return open_port(name, baud=baud, parity=line.parity, stop_bits=line.stop_bits)
+        port = open_port(name, baud=baud, parity=line.parity, stop_bits=line.stop_bits)
     except ValueError as error:
         raise Failure(str(error)) from None
+    return port if line.hear is None else TracedPort(port, line.hear)
 
 
 def open_usual(protocol: Protocol, name: str, baud: int | None, line: Line = Line()) -> Port:  # noqa: B008

@@ -5,22 +5,37 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import signal
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from qlinkgen.backends.python import load
 from qlinkgen.codecs import qlink
+from qlinkgen.link import SlaveEngine
 from qlinkgen.protocols.qlink import VirtualNode
 from qlinkgen.schema import load as load_schema
 from qlinkgen.sim import Wire
 from qlinkgen.sim.pty_bus import PtyBus
 from qlinkgen.transport import PtyPort, open_port, open_pty
-from tests.cli.conftest import Run
+from tests.cli.conftest import OnLine, Run
 from tests.cli.full_disk import FULL_DISK
-from tests.cli.wire import CALM, PATIENCE, REPOSITORY, bus, call, objects, simulated
+from tests.cli.wire import (
+    CALM,
+    PATIENCE,
+    REPOSITORY,
+    bus,
+    call,
+    end,
+    line,
+    objects,
+    read_until,
+    simulated,
+    started,
+)
 
 SCHEMAS = REPOSITORY / "tests" / "schemas"
 
@@ -309,7 +324,7 @@ def test_answers_until_they_are_stopped() -> None:
         assert objects(done.stdout) == [told] * 3
         done = call("send", schema, path, "clear", "--node", "3", "number=5", "--count", "3", *CALM)
         assert done.returncode == 2
-        assert "--count requires endless answers; clear.request has none: omit it" in done.stderr
+        assert "--count requires --every or endless answers; clear.request has none: omit it" in done.stderr
 
 
 def test_an_answer_of_each_node() -> None:
@@ -320,3 +335,78 @@ def test_an_answer_of_each_node() -> None:
         told = [{"message": "gather.response", "node": node, "fields": {"value": 0}} for node in (5, 3)]
         assert objects(done.stdout) == told
         assert "no answer of node 4" in done.stderr
+
+
+def test_again_and_again(qlinkgen: Run, on_line: OnLine) -> None:
+    """Times are those of the line's own clock; of three requests, one is not answered."""
+    heard = 0
+
+    class Forgetful(VirtualNode):
+        def handle(self, request: Any, now: float) -> Any:
+            nonlocal heard
+            heard += 1
+            return None if heard == 2 else super().handle(request, now)
+
+    wire = Wire(baud=115200)
+    wire.attach(SlaveEngine(qlink, Forgetful(3)))
+    asked = ("qlink", on_line(wire), "motor_position", "--node", "3", "--every", "0.5")
+    result = qlinkgen("send", *asked, "--count", "3", "--attempts", "1", "--echo", "none")
+    found = objects(result.out)
+    assert result.code == 0
+    assert [each.pop("at") for each in found] == pytest.approx([0.001, 0.501, 1.001], abs=0.01)
+    answer = {"message": "motor_position.response", "node": 3, "fields": {"position": 0}}
+    assert [found[0], found[2]] == [answer, answer]
+    assert found[1]["error"]["kind"] == "no_reply"  # type: ignore[index]
+    assert "qlinkgen: 3 requests, 2 answered, 1 not; 0 turns left out; response time " in result.err
+    heard = -100
+    started = qlinkgen("send", "qlink", asked[1], "node_start", "--node", "3", *asked[-2:], "--count", "2")
+    assert [each["sent"] for each in objects(started.out)] == ["node_start", "node_start"]
+
+
+def test_a_signal_ends_the_repetition() -> None:
+    with simulated("qlink", "--nodes", "3") as (path, _):
+        asked = ("send", "qlink", path, "motor_position", "--node", "3", "--every", "1000", *CALM)
+        with started(*asked) as process:
+            read_until(process.stdout, "position")
+            code, _, err = end(process, signal.SIGTERM)
+    assert code == 0
+    assert "1 request, 1 answered" in err
+
+
+def test_a_trace(qlinkgen: Run, on_line: OnLine) -> None:
+    node = VirtualNode(3)
+    port = on_line(line(node, baud=115200))
+    result = qlinkgen("send", "qlink", port, "motor_position", "--node", "3", "--trace")
+    assert result.code == 0
+    lines = [line.split(maxsplit=1)[1] for line in result.err.splitlines()]
+    assert lines[0].split() == ["sent", "00", "00"]
+    assert lines[1] == "sent      a5 a5 04 21 03 15 e8 [motor_position.request node 3]"
+    assert lines[2] == (
+        "received  a5 a5 08 21 03 00 00 00 00 fc 19 [motor_position.response node 3 position=0]"
+    )
+    times = [float(line.split()[0]) for line in result.err.splitlines()]
+    assert times == sorted(times)
+    assert times[2] - times[1] == pytest.approx(18 * 10 / 115200, abs=0.001)
+
+
+def test_a_trace_of_what_is_no_answer(qlinkgen: Run, on_line: OnLine) -> None:
+    wire = Wire(baud=115200)
+    wire.attach(Reciter(bytes.fromhex("a5a5082103000000000000")))
+    asked = ("motor_position", "--node", "3", "--trace", "--attempts", "1", "--echo", "none")
+    result = qlinkgen("send", "qlink", on_line(wire), *asked)
+    assert result.code == 1
+    assert "received  a5 a5 08 21 03 00 00 00 00 00 00 [damaged (crc): " in result.err
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("motor_position", "--node", "3", "--every", "0"), "--every 0: a period is above 0 s"),
+        (("motor_position", "--node", "3", "--count", "2"), "--count requires --every or endless answers"),
+        (("motor_position", "--node", "3", "--every", "x"), "--every x: not a number of seconds"),
+    ],
+)
+def test_wrong_repetition(qlinkgen: Run, words: tuple[str, ...], text: str) -> None:
+    result = qlinkgen("send", "qlink", "/dev/not-there", *words)
+    assert (result.code, result.out) == (2, "")
+    assert text in result.err
