@@ -24,7 +24,7 @@ COMMANDS = {
     "explain": "Describe every byte of a frame, and its errors.",
     "crc": "List check values, or find those that fit frames.",
     "simulate": "Simulate nodes, a ring or a chip set on a new port, with optional faults.",
-    "scan": "Find the nodes of a Q.link bus.",
+    "scan": "Find the nodes of a bus.",
     "send": "Send one request on a port and print its response, or one message into a ring.",
     "load": "Load an Intel HEX file into a Q.link node.",
     "monitor": "Listen to a bus or a fibre: requests, responses, repeats, late and damaged frames.",

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from qlinkgen.backends.python import load
+from qlinkgen.link import SlaveEngine
 from qlinkgen.protocols.qlink import VirtualNode
+from qlinkgen.schema import load as load_schema
+from qlinkgen.sim import Wire
+from qlinkgen.sim.generic import GenericNode
 from tests.cli.conftest import OnLine, Run
 from tests.cli.full_disk import FULL_DISK
-from tests.cli.wire import CALM, call, line, objects, on_terminal, simulated
+from tests.cli.wire import CALM, REPOSITORY, call, line, objects, on_terminal, simulated
 
 
 def test_table() -> None:
@@ -21,7 +27,8 @@ def test_table() -> None:
     assert head.split("  ")[0] == "node"
     assert "answer time" in head
     assert set(rule) == {"-", " "}
-    found = [re.fullmatch(r" *(\d+) +1\.0 +0 +(\d+) +\d+\.\d\d ms", row) for row in rows if row]
+    pattern = r" *(\d+) +1 +0 +0 +1\.0 +1\.0 +jvl_mactalk +(\d+) +\d+\.\d\d ms"
+    found = [re.fullmatch(pattern, row) for row in rows if row]
     assert [row and row.groups() for row in found] == [("1", "1001"), ("3", "1003"), ("16", "1016")]
 
 
@@ -33,17 +40,19 @@ def test_json_and_a_node_without_node_info(qlinkgen: Run, on_line: OnLine) -> No
     seconds = [each.pop("seconds") for each in found]
     assert seconds == [0, 0]
     assert found[0] == {
+        "message": "node_info.response",
         "node": 2,
-        "version": "2.7",
-        "product_id": 99,
-        "serial_number": 12345,
-        "t1_delay": 0.3,
-        "t2_delay": 1.0,
-        "position_type": 77,
-        "garbled": False,
+        "fields": {
+            "version_major": 2,
+            "version_minor": 7,
+            "product_id": 99,
+            "serial_number": 12345,
+            "t1_delay": 0.3,
+            "t2_delay": 1.0,
+            "position_type": 77,
+        },
     }
-    assert found[1] == {**dict.fromkeys(found[0]), "node": 5, "garbled": False}
-    assert "does not support node_info" in qlinkgen("scan", "qlink", port, "--nodes", "5").out
+    assert found[1] == {"message": "loop_back.response", "node": 5, "fields": {"offset": 0, "data": "5ac3"}}
 
 
 def test_two_nodes_with_one_number_are_garbled(qlinkgen: Run, on_line: OnLine) -> None:
@@ -59,6 +68,67 @@ def test_two_nodes_with_one_number_are_garbled(qlinkgen: Run, on_line: OnLine) -
     assert qlinkgen("scan", "qlink", port, "--nodes", "5").code == 1
     asked = qlinkgen("send", "qlink", port, "node_info", "--node", "5")
     assert "bytes were received that form no frame; two nodes may have answered at once" in asked.err
+
+
+MODBUS = REPOSITORY / "tests" / "schemas" / "modbus_rtu.yaml"
+
+
+class Shy(GenericNode):
+    """A node that refuses every request."""
+
+    def handle(self, request: Any, now: float) -> Any:
+        reply = next(iter(self.codec.COMMANDS[request.NAME.removesuffix(".request")].replies))
+        return reply(address=self.number, code=2)
+
+    def __init__(self, codec: Any, number: int) -> None:
+        super().__init__(codec, number)
+        self.codec = codec
+
+
+def test_any_schema(qlinkgen: Run, on_line: OnLine) -> None:
+    codec = load(load_schema(MODBUS))
+    wire = Wire(baud=19200)
+    for node in (GenericNode(codec, 7), Shy(codec, 9)):
+        wire.attach(SlaveEngine(codec, node, turnaround=0.01, baud=19200))
+    port = on_line(wire)
+    asked = ("scan", MODBUS, port, "read_input_registers", "start=1", "--nodes", "6-9")
+    found = objects(qlinkgen(*asked, "--json").out)
+    assert [each.pop("seconds", 0) > 0 for each in found] == [True, True]  # type: ignore[operator]
+    assert found == [
+        {"message": "read_input_registers.response", "address": 7, "fields": {"registers": [0]}},
+        {
+            "message": "read_input_registers.exception",
+            "address": 9,
+            "fields": {"code": "illegal_data_address"},
+            "refused": True,
+        },
+    ]
+    text = qlinkgen(*asked, "--trace")
+    assert "refused by read_input_registers.exception" in text.out
+    assert re.search(r"sent      07 04 .* \[read_input_registers.request address 7 start=1", text.err)
+    assert re.search(r"received  07 04 .* \[read_input_registers.response address 7 registers=0\]", text.err)
+
+
+@pytest.mark.parametrize(
+    ("protocol", "words", "text"),
+    [
+        ("trio", (), "there is nothing to scan"),
+        ("vesc", (), "there is nothing to scan"),
+        ("dynamixel_1", ("--nodes", "1"), "has no request without values"),
+        ("qlink", ("node_start",), "node_start is not answered, so it finds no node"),
+        ("qlink", ("motion.response",), "is a response; send its request"),
+    ],
+)
+def test_nothing_to_ask(qlinkgen: Run, protocol: str, words: tuple[str, ...], text: str) -> None:
+    result = qlinkgen("scan", protocol, "x", *words)
+    assert (result.code, result.out) == (2, "")
+    assert text in result.err
+
+
+def test_the_question_of_a_library_protocol(qlinkgen: Run) -> None:
+    """It reads something, sets nothing, and may be repeated."""
+    result = qlinkgen("scan", "tmcl", "/dev/not-there", "--nodes", "1", "--baud", "9600")
+    assert "qlinkgen: asking with " in result.err
 
 
 def test_nobody(qlinkgen: Run, on_line: OnLine) -> None:
@@ -86,7 +156,7 @@ def test_progress_on_a_terminal() -> None:
         (("x", "--nodes", "0-3"), 2, "nodes are 1..16"),
         (("x", "--slack", "-1"), 2, "--slack -1: not a number of seconds"),
         (("x", "--slack", "nan"), 2, "--slack nan: not a number of seconds"),
-        (("x", "--set", "crc=nope"), 2, "unknown 16-bit CRC 'nope'"),
+        (("x", "--set", "crc=nope"), 2, "unknown checksum algorithm 'nope'"),
     ],
 )
 def test_errors(qlinkgen: Run, arguments: tuple[str, ...], code: int, text: str) -> None:

@@ -7,12 +7,16 @@ from dataclasses import dataclass
 
 from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError
+from qlinkgen.link.codec import Framed
 from qlinkgen.link.procedure import Ask, Procedure, Tell
+from qlinkgen.link.survey import Present, survey
 from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink.facts import NODES
 
 #: Data of the loop_back to nodes that do not answer node_info.
 _SIGN = b"\x5a\xc3"
+#: The same requests, as values of a command line.
+QUESTIONS = (("node_info", ()), ("loop_back", (f"data={_SIGN.hex()}",)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,50 +58,23 @@ class NodeStatus:
 def scan(nodes: Iterable[int] = NODES) -> Procedure[list[Found]]:
     """Ask each node for its identity; reports each Found immediately.
 
-    Most buses are not full, so each node is asked only once at first: silent nodes are asked again after all
-    others, and finally with loop_back, since not every node supports node_info. So are those whose answers
-    are garbled.
+    Silent nodes are asked again after all others, and finally with loop_back, since not every node supports
+    node_info.
     """
-    silent = list(nodes)
-    found: list[Found] = []
-    garbled: dict[int, Found] = {}
-    questions = (_who, _who, _loop)
-    for question in questions:
-        still: list[int] = []
-        for node in silent:
-            answer = yield from question(node)
-            if answer is not None and not answer.garbled:
-                found.append(answer)
-                yield Tell(answer)
-                continue
-            still.append(node)
-            if answer is not None:
-                garbled[node] = answer
-        silent = still
-    for node in silent:
-        if node in garbled:
-            found.append(garbled[node])
-            yield Tell(garbled[node])
-    return sorted(found, key=lambda each: each.node)
+    return survey(nodes, (_who, _who, _loop), _found)
 
 
-def _who(node: int) -> Procedure[Found | None]:
-    reply = yield from _ask_once(qlink.NodeInfoRequest(node=node))
-    return Found(node, reply.response, reply.response_time) if isinstance(reply, Reply) else reply
+def _who(node: int) -> Framed:
+    return qlink.NodeInfoRequest(node=node)
 
 
-def _loop(node: int) -> Procedure[Found | None]:
-    reply = yield from _ask_once(qlink.LoopBackRequest(node=node, data=_SIGN))
-    return Found(node, None, reply.response_time) if isinstance(reply, Reply) else reply
+def _loop(node: int) -> Framed:
+    return qlink.LoopBackRequest(node=node, data=_SIGN)
 
 
-def _ask_once(request: qlink.NodeInfoRequest | qlink.LoopBackRequest) -> Procedure[Reply | Found | None]:
-    """Ask without repeats. Return the reply, what was garbled, or None for silence."""
-    try:
-        reply: Reply = yield Ask(request, attempts=1, trial=True)
-    except LinkError as error:
-        return Found(request.node, None, error.elapsed, garbled=True) if error.received else None
-    return reply
+def _found(present: Present) -> Found:
+    info = present.answer if isinstance(present.answer, qlink.NodeInfoResponse) else None
+    return Found(present.node, info, present.seconds, present.garbled)
 
 
 def status(nodes: Iterable[int] = NODES) -> Procedure[list[NodeStatus]]:
