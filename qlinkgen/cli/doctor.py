@@ -14,7 +14,7 @@ from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import load_protocol, on_terminal
 from qlinkgen.cli.diagnosis import Advice, Cost, Echo, advise, cost, probe
 from qlinkgen.cli.tables import Table
-from qlinkgen.cli.wire_options import baud_option, echo_mode, open_free
+from qlinkgen.cli.wire_options import baud_option, echo_mode, open_free, seconds
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import Json
 from qlinkgen.transport.conversation import ASSUMED_LATENCY, OTHER_PROGRAM, WAKE_UP
@@ -51,20 +51,45 @@ _MEANINGS = {
 @click.option(
     "--probe", "probing", is_flag=True, help="Send one byte 00, which begins no frame, and listen for it."
 )
+@click.option(
+    "--find-line",
+    "finding",
+    is_flag=True,
+    help="Listen at one speed and parity after another until frames are valid; with --baud, at that speed.",
+)
+@click.option(
+    "--seconds",
+    "length",
+    callback=seconds,
+    default="1",
+    show_default=True,
+    metavar="SECONDS",
+    help="Time to listen at each setting.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
-def command(protocol: str, port: str, baud: int | None, probing: bool, as_json: bool) -> int:
+def command(  # noqa: PLR0917  # click passes them by name
+    protocol: str, port: str, baud: int | None, probing: bool, finding: bool, length: float, as_json: bool
+) -> int:
     """Open PORT and report what it can do, how its latency affects a transaction, and what to change.
 
     PORT is a device such as /dev/ttyUSB0 or COM3, or a URL such as socket://HOST:PORT. The transaction is the
     longest one of PROTOCOL; a ring has none. Nothing is sent without --probe.
+
+    --find-line needs traffic on the line. A port does not check the parity of what it receives, so even and
+    odd are often both found. Exit code 1 if no setting gives a valid frame.
 
     Exit code 1 if a line begins with fix, or if the port is missing, busy or lost.
 
     \b
     qlinkgen doctor qlink /dev/ttyUSB0
     qlinkgen doctor modbus_rtu /dev/ttyUSB0 --baud 9600 --json
+    qlinkgen doctor modbus_rtu /dev/ttyUSB0 --find-line
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol)
+    if finding:
+        from qlinkgen.cli.line_search import find_line  # noqa: PLC0415  # only this option needs it
+
+        return find_line(loaded, load_codec(loaded), port, baud, length=length, as_json=as_json)
     if probing and echo_mode(loaded, None) != "auto":
         raise Failure(f"--probe: a frame of {loaded.name} may begin with 00, the byte to send; omit it")
     with open_free(loaded, port, baud) as opened:
