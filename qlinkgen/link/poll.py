@@ -2,7 +2,7 @@
 
 Every request has a grid of times, a period apart. Of the requests that are due, the one that has waited
 longest is sent first. A request that the bus had no time for until its next turn is skipped and counted:
-requests never pile up. A node that does not answer is left alone between trials, as `HealthPolicy` says; the
+requests never pile up. A node that does not answer is only asked for trials, as `HealthPolicy` says; the
 first answer brings all its requests back.
 """
 
