@@ -101,6 +101,11 @@ class LengthView:
     bounded: bool
     last: int | None = None
 
+    @property
+    def inline(self) -> str:
+        """Its value as a term."""
+        return f"({self.value})" if any(each in self.value for each in (" | ", " if ")) else self.value
+
 
 @dataclass(frozen=True)
 class StuffingView:
@@ -180,6 +185,21 @@ class BlocksView:
 
 
 @dataclass(frozen=True)
+class OfKind:
+    """What code is the same for each kind of frame.
+
+    Attributes:
+        result: expression for the ``message`` of a ``payload`` in a ``frame``.
+        begun: the message ids that it begins with, and the beginnings of these.
+        passes: functions take an algorithm that replaces that of the schema, or None.
+    """
+
+    result: str
+    begun: Sequence[str]
+    passes: bool
+
+
+@dataclass(frozen=True)
 class PartsView:
     """Any other delimited frame.
 
@@ -191,6 +211,7 @@ class PartsView:
         trim: bytes of a payload that are sent even if they are zeros at its end, None if all are.
         before: parts before the payload that only some frames have; code works on frames with them.
         after: parts at the end that only some frames have; code works on frames without them.
+        kind: it is one of several kinds, None if it is the only one.
     """
 
     title: str
@@ -233,8 +254,14 @@ class PartsView:
     tail_tests: Sequence[str]
     before: ConditionalView | None = None
     after: AfterView | None = None
+    kind: OfKind | None = None
 
     template = "delimited"
+
+    @property
+    def passes(self) -> bool:
+        """Whether functions of one of several kinds take another algorithm."""
+        return self.kind is not None and self.kind.passes
 
     @property
     def extra(self) -> int:
@@ -246,7 +273,7 @@ class PartsView:
         """Whether an encoder computes the only check value of a frame where it adds it."""
         check = self.main
         alone = check is not None and len(self.filling) == 1 and check.otherwise is None
-        return alone and self.quick and not self.before
+        return alone and self.quick and not self.before and self.kind is None
 
     @property
     def last(self) -> bool:

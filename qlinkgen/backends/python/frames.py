@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import assert_never
 
 from qlinkgen.backends.python import integers, pieces
@@ -18,6 +19,7 @@ from qlinkgen.backends.python.frame_views import (
     HeadCheck,
     LengthView,
     MarkedView,
+    OfKind,
     PacketView,
     PartsView,
     StuffingView,
@@ -46,6 +48,7 @@ from qlinkgen.plan.parts import (
     IdPart,
     LengthPart,
     MarkPart,
+    Numeric,
     Part,
     PayloadPart,
 )
@@ -243,7 +246,7 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
         address_of=pieces.number(envelope, envelope.address, "head") if _leads(envelope) else "",
         bare=bare,
         verified=verified,
-        head_checks=list(_head_checks(plan, envelope, bare=bare)),
+        head_checks=list(_head_checks(plan.frame, envelope, bare=bare)),
         values=[attribute(member.name) for _, member in whole.values],
         counter=_counter(plan),
         counts_some=any(not plan.protocol.counts(each.message) for each in plan.messages),
@@ -251,6 +254,22 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
         master=_master(plan),
         tail_tests=[test for part in envelope.back for test in pieces.tail_tests(envelope, part)],
         before=before_view(envelope),
+    )
+
+
+def parts_of_kind(plan: Plan, frame: FramePlan, result: str) -> PartsView:
+    """The view of one of several kinds of frame; ``result`` as in `OfKind`."""
+    envelope = frame.envelope
+    view = _parts(replace(plan, frames=dict.fromkeys(plan.frames, frame)), "", bare=False, verified=True)
+    base = f"{frame.base} + " if frame.base else ""
+    numbers = [pieces.number(envelope, envelope.id, source) for source in ("head", "frame")]
+    in_head, in_frame = (f"{base}({each})" if base and " " in each else base + each for each in numbers)
+    return replace(
+        view,
+        blank="",
+        id_of=in_head,
+        id_of_frame=in_frame,
+        kind=OfKind(result, begun=list(_begun(envelope)), passes=True),
     )
 
 
@@ -420,34 +439,53 @@ def _stuffing(plan: Plan) -> StuffingView | None:
     return StuffingView(whole, after, insert, front, back, last=in_hex(rule.after[-1]))
 
 
-def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[HeadCheck]:
+def _begun(envelope: Envelope) -> Iterator[str]:
+    """The message ids that frames begin with, as far as received; none if a constant begins them."""
+    if not envelope.preamble and envelope.starts:
+        sizes = range(1, len(envelope.starts[0]) + 1)
+        yield from map(literal, sorted({start[:size] for start in envelope.starts for size in sizes}))
+
+
+def _head_checks(frame: FramePlan, envelope: Envelope, *, bare: bool) -> Iterator[HeadCheck]:
     """The checks of a header, part by part, as far as received."""
-    no_frame = '"no_frame", start, b""'
     for part in envelope.front:
         start, end = envelope.offset(part), envelope.offset(part) + part.size
         match part:
             case ConstantPart():
                 test = f"not {literal(part.data)}.startswith(head[{start}:{end}])"
-                yield HeadCheck(test, no_frame, "constant", _differs(part.data, start, end))
+                yield HeadCheck(test, '"no_frame", start, b""', "constant", _differs(part.data, start, end))
             case LengthPart() if envelope.before and envelope.before.length:
                 yield _one_of_two(envelope, part, longer=part is envelope.before.length)
             case LengthPart():
-                coded = isinstance(plan.frame.transparency, FrameStuffing | Coded)
-                place = f"_take(buf, start, {end})[1]" if coded else f"start + {end}"
-                bounds = "_MIN_LENGTH <= _length(head) <= _MAX_LENGTH"
-                yield HeadCheck(f"len(head) >= {end} and not {bounds}", f'"length", {place}, b""')
+                yield _length_check(frame, part, end)
             case IdPart() | AddressPart() | CellPart() | EqualPart():
-                tests = (pieces.wrong(envelope, part, *source) for source in (("head",), pieces.BUFFER))
-                for test, whole in zip(*tests, strict=True):
-                    yield HeadCheck(f"len(head) >= {end} and {test}", no_frame, "constant", whole)
-                if bare and envelope.identifies(part) and envelope.known_at(part, envelope.id):
-                    yield from _bare_checks(envelope, part, f"len(head) >= {end} and", no_frame)
+                yield from _number_checks(envelope, part, bare=bare)
             case CheckPart():
                 pass
             case MarkPart() | PayloadPart() | BlocksPart():
                 raise AssertionError(f"{part.name} is not a part of a header")
             case _:
                 assert_never(part)
+
+
+def _number_checks(envelope: Envelope, part: Numeric, *, bare: bool) -> Iterator[HeadCheck]:
+    no_frame, end = '"no_frame", start, b""', envelope.offset(part) + part.size
+    if isinstance(part, IdPart) and part.numbers:
+        yield HeadCheck(f"head[:{end}] not in _BEGUN", no_frame, "constant")
+    tests = (pieces.wrong(envelope, part, *source) for source in (("head",), pieces.BUFFER))
+    for test, whole in zip(*tests, strict=True):
+        yield HeadCheck(f"len(head) >= {end} and {test}", no_frame, "constant", whole)
+    if bare and envelope.identifies(part) and envelope.known_at(part, envelope.id):
+        yield from _bare_checks(envelope, part, f"len(head) >= {end} and", no_frame)
+
+
+def _length_check(frame: FramePlan, part: LengthPart, end: int) -> HeadCheck:
+    coded = isinstance(frame.transparency, FrameStuffing | Coded)
+    place = f"_take(buf, start, {end})[1]" if coded else f"start + {end}"
+    bounds = "_MIN_LENGTH <= _length(head) <= _MAX_LENGTH"
+    if frame.name:  # of several kinds: a call costs time
+        bounds = f"{part.least} <= {pieces.read(frame.envelope, part, 'head')} <= {part.most}"
+    return HeadCheck(f"len(head) >= {end} and not {bounds}", f'"length", {place}, b""')
 
 
 def _differs(data: bytes, start: int, end: int) -> str:

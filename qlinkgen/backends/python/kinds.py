@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 from typing import assert_never
 
 from qlinkgen.backends.python import integers, pieces, values
-from qlinkgen.backends.python.check_views import CheckView, PlacedCheck
+from qlinkgen.backends.python.check_views import CheckView
 from qlinkgen.backends.python.decode import Decoder
 from qlinkgen.backends.python.encode import Encoder
-from qlinkgen.backends.python.frame_checks import check_view, placed, seed_name
-from qlinkgen.backends.python.frame_views import EndedView, FrameView
-from qlinkgen.backends.python.frames import ended_view
+from qlinkgen.backends.python.frame_checks import seed_name
+from qlinkgen.backends.python.frame_views import FrameView, PartsView
+from qlinkgen.backends.python.frames import parts_of_kind
 from qlinkgen.backends.python.layout import in_hex, literal
 from qlinkgen.backends.python.names import attribute, natural
 from qlinkgen.backends.python.place import Place
 from qlinkgen.model.naming import address_argument, address_attribute
 from qlinkgen.model.types import Scalar
-from qlinkgen.plan.ends import ByLength
+from qlinkgen.plan.ends import ByMessage
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
@@ -50,57 +50,31 @@ class KindView:
 
     Attributes:
         name: its name.
+        parts: the view of its frame, whose names end with that of the kind.
         numbers: statements that compute the numbers of its parts from those of message, address and payload.
         front: expressions for the bytes before the payload.
         back: those after it, with zeros for check values.
-        addressed: it has an address.
-        checks: the check values in wire order.
-        filling: the same in the order in which they are computed.
-        header: size before the payload.
-        overhead: size before and after it.
-        head_tests: conditions for a wrong header, and the first elements of the result of ``_split``.
-        size: size of the whole frame by its header, "" if the message gives it.
-        tail_tests: conditions for wrong bytes after the payload.
-        number: the number of the message in ``frame``, or in its header ``head``.
-        address: the address in ``frame``, "None" without one.
-        verified: contents that are wrong do not deny a frame with a valid check value.
-        seeded: that covers attributes of the message.
+        seeded: check values cover attributes of the message.
         checked_values: statements that convert and check the values of the frame of ``message``.
         held_values: statements that set the values of ``message`` from ``frame``.
-        ended: its terminator, None without one.
-        least: minimum size of its payload.
-        most: maximum size of it.
-        lead: the constant that it begins with, b"" if that is the message id.
-        begun: the message ids that it begins with, and the beginnings of these.
         turned: only its turn in a dialogue tells it, so decoders of frames do not know it.
     """
 
     name: str
+    parts: PartsView
     numbers: Sequence[str]
     front: str
     back: str
-    addressed: bool
-    checks: Sequence[PlacedCheck]
-    filling: Sequence[PlacedCheck]
-    header: int
-    trailer: int
-    overhead: int
-    head_tests: Sequence[tuple[str, str]]
-    size: str
-    tail_tests: Sequence[str]
-    number_in_head: str
-    number: str
-    address: str
-    verified: bool
     seeded: bool
     checked_values: Sequence[str]
     held_values: Sequence[str]
-    ended: EndedView | None
-    least: int
-    most: int
-    lead: str
-    begun: Sequence[str]
     turned: bool
+
+    @property
+    def insert(self) -> str:
+        """The inserted byte that may follow a frame, "" if none may."""
+        stuffing = self.parts.stuffing
+        return stuffing.insert if stuffing and stuffing.whole and not stuffing.coding else ""
 
 
 @dataclass(frozen=True)
@@ -140,7 +114,9 @@ class KindsView:
         counted: some kinds have a counter.
         settled: some messages have values that are always the same.
         restarts: it begins anew after some commands.
-        lasts: the last bytes of terminators.
+        ended: terminators end some kinds.
+        lasts: the bytes that may end a frame before its size is received, or reveal that it is none.
+        eager: any byte may.
     """
 
     title: str
@@ -158,7 +134,9 @@ class KindsView:
     counted: bool
     settled: bool
     restarts: bool
+    ended: bool
     lasts: Sequence[str]
+    eager: bool
     check: CheckView | None
 
     template = "kinds"
@@ -167,7 +145,12 @@ class KindsView:
     @property
     def coded(self) -> bool:
         """Whether frames of some kinds are coded."""
-        return any(each.ended and each.ended.coding for each in self.kinds)
+        return any(each.parts.coding or each.parts.stuffing for each in self.kinds)
+
+    @property
+    def inserts(self) -> bool:
+        """Whether an inserted byte may follow some frames."""
+        return any(each.insert for each in self.found)
 
     @property
     def has_turns(self) -> bool:
@@ -186,6 +169,9 @@ AnyView = FrameView | KindsView
 def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
     """The view of the kinds of frame of a protocol; ``make`` names its conversions."""
     views = {frame.name: _kind(frame, plan, make) for frame in plan.frame.kinds}
+    check = _selectable(list(views.values()))
+    if check is None:
+        views = {name: replace(view, parts=_unreplaced(view.parts)) for name, view in views.items()}
     families: dict[int, list[tuple[int, KindView, int]]] = {}
     for frame in sorted(plan.frame.kinds, key=lambda each: each.max_payload):
         families.setdefault(frame.base, []).append((frame.max_payload, views[frame.name], frame.base))
@@ -206,16 +192,18 @@ def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
         found=[views[each.name] for each in plan.frame.sought if any(each in s for s in searched.values())],
         by_first={way: [(in_hex(first), kinds) for first, kinds in rows] for way, rows in by_first.items()},
         families=[(in_hex(base), kinds) for base, kinds in families.items()],
-        measured=any(not view.size and view.ended is None for view in views.values()),
+        measured=any(isinstance(frame.end, ByMessage) for frame in plan.frame.kinds),
         values=[_value(member, make.place) for member in plan.frame.values.values()],
         slots=sorted([*([address.name] if name else []), *map(attribute, plan.frame.values)], key=natural),
         seeds=sorted({seed_name(seed) for each in plan.frame.kinds for seed in _seeds(each)}),
         counted=plan.protocol.counter is not None,
         settled=any(each.message.settled for each in plan.messages),
         restarts=plan.protocol.restarts,
-        lasts=list(dict.fromkeys(view.ended.last for view in views.values() if view.ended)),
-        check=_selectable(list(views.values())),
-        makers=frozenset(check.view.maker for view in views.values() for check in view.checks),
+        ended=any(view.parts.ended for view in views.values()),
+        lasts=list(dict.fromkeys(last for view in views.values() for last in _lasts(view.parts))),
+        eager=any(_is_eager(view.parts) for view in views.values()),
+        check=check,
+        makers=frozenset(each.view.maker for view in views.values() for each in view.parts.checks),
     )
 
 
@@ -232,7 +220,7 @@ def _by_first(
 
 def _selectable(kinds: Sequence[KindView]) -> CheckView | None:
     """The main check value of the first kind that has one, if that of each can be replaced."""
-    found = [check.view for kind in kinds for check in kind.checks if check.main]
+    found = [check.view for kind in kinds for check in kind.parts.checks if check.main]
     return found[0] if found and all(view.selectable for view in found) else None
 
 
@@ -246,67 +234,42 @@ def _seeds(frame: FramePlan) -> Iterator[Seed]:
         yield from frame.envelope.seeds(part)
 
 
+def _unreplaced(view: PartsView) -> PartsView:
+    """The view of a frame whose check value no algorithm can replace."""
+    assert view.kind is not None
+    return replace(view, kind=replace(view.kind, passes=False))
+
+
+def _lasts(view: PartsView) -> Iterator[str]:
+    if view.ended:
+        yield view.ended.last
+    elif view.stuffing and view.stuffing.whole:
+        yield from filter(None, [view.stuffing.reveals or view.stuffing.last])
+
+
+def _is_eager(view: PartsView) -> bool:
+    stuffing = view.stuffing
+    coded = stuffing is not None and stuffing.whole and stuffing.coding is not None
+    return coded and stuffing is not None and not (stuffing.reveals or stuffing.steady)
+
+
 def _kind(frame: FramePlan, plan: Plan, make: Maker) -> KindView:
     envelope = frame.envelope
     carried = next((each for each in plan.messages if frame in each.frames), None)
     members = Members(envelope, carried, make) if carried and envelope.values else None
-    checks = {part.name: _check(frame, part) for part in envelope.checks}
-    base = f"{frame.base} + " if frame.base else ""
-    addressed = bool(envelope.address)
+    address = pieces.number(envelope, envelope.address, "frame") if envelope.address else "None"
+    result = f"message.from_bytes(payload{f', {address}' if plan.frame.address else ''})"
     return KindView(
         name=frame.name,
+        parts=parts_of_kind(plan, frame, f"_held({result}, frame)" if members else result),
         numbers=list(_numbers(envelope)),
         checked_values=members.checked if members else [],
         held_values=members.held if members else [],
         seeded=bool(envelope.seeded),
         front=" + ".join(_bytes(part) for part in envelope.front) or 'b""',
         back=" + ".join(_bytes(part) for part in envelope.back),
-        addressed=addressed,
-        checks=list(checks.values()),
-        filling=[checks[part.name] for part in envelope.filling],
-        header=envelope.header_size,
-        trailer=envelope.trailer_size,
-        overhead=envelope.overhead,
-        head_tests=list(_head_tests(envelope, frame.name)),
-        begun=list(_begun(envelope)),
         turned=frame.turned,
-        size=_size(frame, envelope),
-        tail_tests=[test for part in envelope.back for test in pieces.tail_tests(envelope, part)],
-        number_in_head=base + _grouped(pieces.number(envelope, envelope.id, "head"), base),
-        number=base + _grouped(pieces.number(envelope, envelope.id, "frame"), base),
-        address=pieces.number(envelope, envelope.address, "frame") if addressed else "None",
-        verified=bool(envelope.checks),
-        ended=ended_view(frame, bare=False, mark=f"_{frame.name.upper()}") if frame.whole else None,
-        least=envelope.payload.least,
-        most=envelope.payload.most,
-        lead=literal(envelope.preamble),
     )
-
-
-def _grouped(number: str, base: str) -> str:
-    return f"({number})" if base and " " in number else number
-
-
-def _check(frame: FramePlan, part: CheckPart) -> PlacedCheck:
-    envelope = frame.envelope
-    mark = _mark(envelope, part, frame.name)
-    found = placed(envelope, part, mark, early=not frame.whole)
-    return replace(found, view=check_view(part.check, mark.upper()))
-
-
-def _mark(envelope: Envelope, part: CheckPart, name: str) -> str:
-    number = envelope.checks.index(part) + 1
-    return f"_{name}" if number == 1 else f"_{number}_{name}"
-
-
-def _size(frame: FramePlan, envelope: Envelope) -> str:
-    if not isinstance(frame.end, ByLength):
-        return ""
-    part = frame.end.part
-    seen = pieces.read(envelope, part, "head")
-    seen = f"{seen} * {part.scale}" if part.scale > 1 else seen
-    more = envelope.overhead - part.bias
-    return f"{seen} {'+' if more > 0 else '-'} {abs(more)}" if more else seen
 
 
 @dataclass(frozen=True)
@@ -421,39 +384,3 @@ def _bytes(part: Part) -> str:
             raise AssertionError(f"{part.name} is beside a payload")
         case _:
             assert_never(part)
-
-
-# Reading a frame
-
-
-def _head_tests(envelope: Envelope, name: str) -> Iterator[tuple[str, str]]:
-    """The checks of a header, part by part, as far as received."""
-    for part in envelope.front:
-        start, end = envelope.offset(part), envelope.offset(part) + part.size
-        match part:
-            case ConstantPart():
-                yield f"not {literal(part.data)}.startswith(head[{start}:{end}])", '"no_frame", start'
-            case IdPart() if part.numbers:
-                yield f"head[:{end}] not in _BEGUN_{name.upper()}", '"no_frame", start'
-            case LengthPart():
-                seen = pieces.read(envelope, part, "head")
-                yield (
-                    f"len(head) >= {end} and not {part.least} <= {seen} <= {part.most}",
-                    f'"length", start + {end}',
-                )
-            case IdPart() | AddressPart() | CellPart() | EqualPart():
-                for test in pieces.wrong(envelope, part, "head"):
-                    yield f"len(head) >= {end} and {test}", '"no_frame", start'
-            case CheckPart():
-                pass
-            case MarkPart() | PayloadPart() | BlocksPart():
-                raise AssertionError(f"{part.name} is not a part of a header")
-            case _:
-                assert_never(part)
-
-
-def _begun(envelope: Envelope) -> Iterator[str]:
-    """The message ids that frames begin with, as far as received; none if a constant begins them."""
-    if not envelope.preamble and envelope.starts:
-        sizes = range(1, len(envelope.starts[0]) + 1)
-        yield from map(literal, sorted({start[:size] for start in envelope.starts for size in sizes}))

@@ -255,7 +255,7 @@ class Module:
             case PacketView():
                 used |= {"short_of"}
             case KindsView():
-                used |= {"wrong_check", *view.makers} if view.makers else set()
+                used |= {"Checksum", "wrong_check", *view.makers} if view.makers else set()
                 used |= {"illegal", "refused"} if view.address or view.settled else set()
                 used |= {
                     *(["index"] if view.address else []),

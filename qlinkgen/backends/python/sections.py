@@ -10,8 +10,8 @@ import jinja2
 
 from qlinkgen.backends import python_text
 from qlinkgen.backends.python.frame_views import PartsView
-from qlinkgen.backends.python.kinds import AnyView
-from qlinkgen.backends.python.ways import Ways, definitions, differing, merged
+from qlinkgen.backends.python.kinds import AnyView, KindsView
+from qlinkgen.backends.python.ways import Ways, definitions, differing, merged, needed
 from qlinkgen.backends.templates import environment
 from qlinkgen.model.message import Direction
 
@@ -78,12 +78,29 @@ class Sections:
             return Ways(frozenset())
         return differing([{**made, **self._found[way]} for way, made in self._made.items()])
 
+    @functools.cached_property
+    def _of_kinds(self) -> tuple[str, str]:
+        """Definitions for encoding and for decoding the frames of each kind; "" if there is one."""
+        wrapping, finding, view = [], [], self._view
+        if not isinstance(view, KindsView):
+            return "", ""
+        for kind in (each for each in view.kinds if not each.turned):
+            made = definitions(self._rendered("delimited", kind.parts, owner="Message"))
+            search = definitions(self._rendered("delimited_search", kind.parts))
+            ways, wraps = Ways(frozenset({*made, *search, "_held"})), needed(made, ["_wrapped"])
+            finds = needed({**made, **search}, ["_split", "_judge"])
+            wrapping.append(merged({kind.name: wraps}, ways).strip())
+            if kind in view.found:
+                others = {name: text for name, text in finds.items() if name not in wraps}
+                finding.append(merged({kind.name: others}, ways).strip())
+        return "\n\n\n".join(wrapping), "\n\n\n".join(finding)
+
     @property
     def frame(self) -> str:
         """The section before the classes of messages."""
         view = self._view
         if view.template != "delimited":
-            return self._rendered(view.template, view).strip()
+            return self._rendered(view.template, view, made=self._of_kinds[0]).strip()
         ended = any(
             isinstance(each, PartsView) and each.after and each.after.values for each in self.views.values()
         )
@@ -101,7 +118,7 @@ class Sections:
         """Functions that find frames in bytes."""
         view = self._view
         if view.template != "delimited":
-            return ""
+            return self._of_kinds[1]
         if not self.directed:
             return self._rendered("delimited_search", view)
         received = {way: found for way, found in self._found.items() if way in self.received}

@@ -57,6 +57,14 @@ def _uses(text: str, names: Iterable[str]) -> bool:
     return any(re.search(rf"\b{name}\b", text) for name in names)
 
 
+def needed(texts: Mapping[str, str], roots: Iterable[str]) -> dict[str, str]:
+    """The definitions that those with these names use, with themselves, in their order."""
+    names = set(roots) & texts.keys()
+    while more := {name for name in texts.keys() - names if any(_uses(texts[n], [name]) for n in names)}:
+        names |= more
+    return {name: text for name, text in texts.items() if name in names}
+
+
 def merged(texts: Mapping[str, Mapping[str, str]], ways: Ways) -> str:
     """The definitions of each direction; those that they have in common once."""
     printed: dict[str, str] = {}
