@@ -26,7 +26,7 @@ from qlinkgen.cli.common import (
     warn_unconfirmed,
 )
 from qlinkgen.cli.conversations import Answers, Conversation
-from qlinkgen.cli.encode import asked
+from qlinkgen.cli.encode import asked, proving
 from qlinkgen.cli.hex_text import HexError, HexReader
 from qlinkgen.cli.streams import Alone, Bad, Event, Stream, open_stream
 from qlinkgen.link.codec import Fault, Message
@@ -87,9 +87,11 @@ def command(  # noqa: PLR0917  # click passes them by name
     chunks = _input(hex_, raw=raw)
     loaded = load_protocol(protocol, crc, version)
     codec = load_codec(loaded)
-    stream = _stream(loaded, codec, direction, request)
     if name is not None:
-        stream = Alone(codec, turned_message(loaded, name).name)
+        message = turned_message(loaded, name)
+        stream: Stream = Alone(codec, message.name, proving(loaded, codec, message, request))
+    else:
+        stream = _stream(loaded, codec, direction, request)
     gaps = frame_plan(loaded.frame).silent
     if gaps and raw:
         what = f"only a silence ends a frame of {loaded.name}, and raw bytes have no times"

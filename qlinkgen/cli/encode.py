@@ -22,6 +22,7 @@ from qlinkgen.cli.common import (
     warn_unconfirmed,
 )
 from qlinkgen.cli.describe import addresses_text
+from qlinkgen.link.codec import prove
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
@@ -50,7 +51,7 @@ json_option = click.option(
 @assignments_argument
 @address_option
 @json_option
-@click.option("--request", "request", metavar="HEX", help="Packets: the request of a response.")
+@click.option("--request", "request", metavar="HEX", help="The request of a response that depends on it.")
 @crc_option
 @version_option
 def command(  # noqa: PLR0917  # click passes them by name
@@ -215,11 +216,31 @@ def _frame(
     protocol: Protocol, codec: ModuleType, message: Message, built: MessageObject, request: str | None
 ) -> bytes:
     answer = frame_plan(protocol.frame).needs_request and message.direction == "response"
+    command = protocol.command_of(message)
+    if command is not None and command.response is message and command.proof is not None:
+        if (known := proving(protocol, codec, message, request)) is not None:
+            prove(codec.COMMANDS[command.name], known, built)
+        return built.to_frame()
     if not answer:
         if request is not None:
             raise Failure(f"{message.name} does not depend on a request; omit --request")
         return built.to_frame()
     return built.to_frame(asked(protocol, codec, request, message))
+
+
+def proving(
+    protocol: Protocol, codec: ModuleType, message: Message, request: str | None
+) -> MessageObject | None:
+    """Return the request of ``--request`` for a message that its turn tells; None without the option."""
+    if request is None:
+        return None
+    command = protocol.command_of(message)
+    if command is None or command.response is not message or command.proof is None:
+        raise Failure(f"--request has no effect: {message.name} has no check value that covers it; omit it")
+    found = asked(protocol, codec, request)
+    if command.request.name != found.NAME:
+        raise Failure(f"--request {request} is {found.NAME}, not the request of {message.name}")
+    return found
 
 
 def asked(

@@ -8,6 +8,7 @@ import click
 
 from qlinkgen.cli.arguments import protocol_argument
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
+from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import (
     crc_option,
     load_protocol,
@@ -16,6 +17,7 @@ from qlinkgen.cli.common import (
     turned_message,
     version_option,
 )
+from qlinkgen.cli.encode import proving
 from qlinkgen.cli.findings import finding, notes
 from qlinkgen.cli.span_text import value_of
 from qlinkgen.cli.streams import PROGRESS
@@ -39,7 +41,10 @@ Line = tuple[int, str, str, str, bool]
     help="Direction of the frame; guessed by default.",
 )
 @click.option(
-    "--request", "request", metavar="HEX", help="Packets: the request; HEX is then only its response."
+    "--request",
+    "request",
+    metavar="HEX",
+    help="The request of a response that depends on it; HEX is then only the response.",
 )
 @click.option("--message", "name", metavar="MESSAGE", help="What HEX is, where only its turn tells it.")
 @crc_option
@@ -71,7 +76,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     plan = plan_of(loaded)
     if name is not None:
         message = plan.message(turned_message(loaded, name).name)
-        told = dissect(plan, data, message.direction, turned=message)
+        proving(loaded, load_codec(loaded), message.message, request)
+        told = dissect(plan, data, message.direction, asked or b"", turned=message)
         found, hints = [told], notes(told)
     else:
         found, hints = explained(plan, data, direction, asked)

@@ -111,6 +111,11 @@ def finding(found: Dissection, fault: Fault, start: int = 0) -> Words:  # noqa: 
             return f"{of.name} is {fault.seen}: the command was refused as illegal", cause
         case Rule.VALUE:
             return _value(found, fault)
+        case Rule.PROOF:
+            assert isinstance(of, Step)
+            rule = f"the request and the bytes before it give {fault.right:#x}"
+            cause = "bytes were corrupted, or it answers another request"
+            return f"{of.name} is {fault.seen:#x}, but {rule}", cause
         case _:
             assert_never(fault.rule)
 

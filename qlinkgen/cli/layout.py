@@ -110,6 +110,8 @@ def _layout(title: str, stated: Message | Layout, payload: PayloadPlan) -> None:
     for field, step in zip(stated.fields, payload.steps, strict=True):
         offset = step.place.offset
         notes = [f"= request.{field.repeats}"] if field.repeats else []
+        covered = ", ".join(f"request.{each}" for each in field.proves)
+        notes += [f"check value of {covered} and the bytes before it"] if covered else []
         notes += [] if field.confirmed else [UNCONFIRMED]
         if step.presence:
             notes.append("empty if absent" if payload.separator else presence_text(step.presence))

@@ -15,7 +15,7 @@ from types import ModuleType
 from typing import Protocol, assert_never
 
 from qlinkgen.cli.codec import MessageObject
-from qlinkgen.link.codec import Fault, Framed, Message, address_of, is_message
+from qlinkgen.link.codec import Fault, Framed, Message, address_of, is_message, unproven
 from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol as Described
 from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator, ByTurn
@@ -72,9 +72,10 @@ class OneWay:
 class Alone:
     """The bytes of one message that only its turn in a dialogue tells."""
 
-    def __init__(self, codec: ModuleType, name: str) -> None:
-        """Decode the message with this name."""
+    def __init__(self, codec: ModuleType, name: str, request: MessageObject | None = None) -> None:
+        """Decode the message with this name; ``request`` is what it answers, None if that is not known."""
         self._codec, self._name, self._data = codec, name, b""
+        self._request = request
 
     def feed(self, data: bytes) -> list[Event]:
         """Take bytes."""
@@ -86,9 +87,19 @@ class Alone:
         data, self._data = self._data, b""
         if data:
             try:
-                yield self._codec.MESSAGES[self._name].from_bytes(data)
+                found = self._codec.MESSAGES[self._name].from_bytes(data)
             except self._codec.DecodeError as error:
                 yield Bad(error.kind, 0, data, str(error))
+                return
+            fault = self._unproven(found)
+            yield Bad("crc", 0, data, fault) if fault else found
+
+    def _unproven(self, found: Framed) -> str:
+        """What is wrong with the check value of a response that covers its request."""
+        if self._request is None:
+            return ""
+        commands = {each.request: each for each in self._codec.COMMANDS.values()}
+        return unproven(commands[type(self._request)], self._request, found)
 
 
 class InStep:

@@ -331,6 +331,36 @@ def fill(echoes: Echoes, request: Message, response: Message) -> None:
             setattr(response, name, getattr(request, of) if isinstance(of, str) else of)
 
 
+class Proof(Protocol):
+    """The check value of a response that covers bytes of its request, of a generated module."""
+
+    field: str
+
+    def compute(self, request: bytes, payload: bytes, /) -> int:
+        """Return the value for the frame of a request and the payload of its response."""
+        ...
+
+
+def proof_of(command: Command) -> Proof | None:
+    """The check value of the response to a command that covers its request, None without one."""
+    return getattr(command, "proof", None)
+
+
+def unproven(command: Command, request: Framed, response: Message) -> str:
+    """Return what is wrong with the check value of a response that covers its request, "" if it is right."""
+    proof = proof_of(command) if type(response) is command.response else None
+    if proof is None:
+        return ""
+    seen, right = getattr(response, proof.field), proof.compute(request.to_frame(), response.to_bytes())
+    return "" if seen == right else f"{response.NAME}: {proof.field}: received {seen:#x}, expected {right:#x}"
+
+
+def prove(command: Command, request: Framed, response: Message) -> None:
+    """Give a response the check value that covers its request."""
+    if (proof := proof_of(command)) is not None and type(response) is command.response:
+        setattr(response, proof.field, proof.compute(request.to_frame(), response.to_bytes()))
+
+
 def echoes_of(command: Command, answer: type[Message]) -> Echoes | None:
     """What an answer of a class repeats, None if it does not answer the command."""
     if answer is command.response:

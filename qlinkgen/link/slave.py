@@ -16,6 +16,7 @@ from qlinkgen.link.codec import (
     fill,
     is_message,
     missized,
+    prove,
     wrong_size,
 )
 from qlinkgen.link.echo import EchoCanceller
@@ -349,8 +350,11 @@ class SlaveEngine:
     def _fill(self, request: Framed, response: Message) -> None:
         """Give an answer what it repeats of the request that began its transaction."""
         command = self._commands.get(type(request))
-        if command is not None and (echoes := echoes_of(command, type(response))):
+        if command is None:
+            return
+        if echoes := echoes_of(command, type(response)):
             fill(echoes, request, response)
+        prove(command, request, response)
 
     def _check(self, request: Framed, response: Message) -> None:
         """Refuse a response of another size than the request asks for, which a master would not accept."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
-from qlinkgen.link.codec import Command, Framed, Message, StepSpan
+from qlinkgen.link.codec import Command, Framed, StepSpan, unproven
 
 if TYPE_CHECKING:
     from typing_extensions import TypeIs
@@ -32,7 +32,7 @@ class Turned(Framed, Protocol):
         ...
 
 
-def is_turned(kind: type[Message] | None) -> TypeIs[type[Turned]]:
+def is_turned(kind: type[object] | None) -> TypeIs[type[Turned]]:
     """Whether only its turn tells a message."""
     return getattr(kind, "TURN", None) is not None
 
@@ -53,11 +53,11 @@ def has_turns(command: Command) -> bool:
 class Collected:
     """The bytes of a message whose turn it is; those after it are ignored."""
 
-    __slots__ = ("_data", "_kind", "_over", "_size")
+    __slots__ = ("_asked", "_command", "_data", "_kind", "_over", "_size")
 
-    def __init__(self, kind: type[Turned], command: Command, asked: Message) -> None:
+    def __init__(self, kind: type[Turned], command: Command, asked: Framed) -> None:
         """``asked`` is the last frame that may say the number of its items, as in `wrong_size`."""
-        self._kind = kind
+        self._kind, self._command, self._asked = kind, command, asked
         fixed, bits = kind.TURN
         #: Its size if an earlier frame says it, otherwise 0.
         self._size = 0
@@ -81,6 +81,8 @@ class Collected:
         if size < 0:
             return Misread("length", 0, self._data, "a count is out of range")
         try:
-            return self._kind.from_bytes(self._data)
+            message = self._kind.from_bytes(self._data)
         except wrong as error:
             return Misread(getattr(error, "kind", ""), 0, self._data, str(error))
+        fault = unproven(self._command, self._asked, message)
+        return Misread("crc", 0, self._data, fault) if fault else message

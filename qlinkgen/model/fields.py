@@ -120,6 +120,8 @@ class Field:
     confirmed: bool = True
     #: What it repeats of the request: a value, or a part of its frame; "" for others.
     repeats: str = ""
+    #: Parts of the frame of the request that it is a check value of, () for others.
+    proves: tuple[str, ...] = ()
     #: It is present only where this holds.
     when: Condition = ()
     #: It may be left out at the end.

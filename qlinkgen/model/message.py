@@ -99,8 +99,9 @@ class Message:
 
     @property
     def echoes(self) -> tuple[str, ...]:
-        """Values that repeat something of the request."""
-        return (*self.echoed, *(value.name for value in self.values if value.field.repeats))
+        """Values that repeat something of the request, or prove it."""
+        found = (each.name for each in self.values if each.field.repeats or each.field.proves)
+        return (*self.echoed, *found)
 
     @property
     def docs(self) -> dict[str, str]:

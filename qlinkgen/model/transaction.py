@@ -8,6 +8,7 @@ from fractions import Fraction
 from types import MappingProxyType
 from typing import Literal
 
+from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.message import Message
 from qlinkgen.model.texts import Labels, Text
 
@@ -80,15 +81,30 @@ class Reply:
 
 
 @dataclass(frozen=True, slots=True)
-class Echo:
-    """A value of an answer that repeats something of the request.
+class Proof:
+    """A check value of an answer that covers parts of the frame of its request, by their names in ``over``.
 
-    ``of`` is the name of a value of the request, or a number that is the same in all requests of a command.
+    Then it covers the bytes of the answer from ``begin`` up to itself; they are the last but its ``size``.
     """
+
+    algorithm: Checksum
+    over: tuple[str, ...]
+    begin: int
+    size: int
+
+
+#: What a value of an answer has from its request: the name of a value of it, a number that is the same in all
+#: requests of a command, or a check value.
+Repeated = str | int | Proof
+
+
+@dataclass(frozen=True, slots=True)
+class Echo:
+    """A value of an answer that follows from its request."""
 
     answer: str
     value: str
-    of: str | int
+    of: Repeated
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,12 +240,18 @@ class Command:
         """The list whose nodes answer one by one, None for other commands."""
         return self.many if isinstance(self.many, ByEach) else None
 
-    def repeated(self, answer: Message | None) -> Mapping[str, str | int]:
-        """The values of one of its answers that repeat its request: `Echo.of` by their names."""
+    def repeated(self, answer: Message | None) -> Mapping[str, Repeated]:
+        """The values of one of its answers that follow from its request: `Echo.of` by their names."""
         if answer is None:
             return {}
         own = {each.value: each.of for each in self.echoes if each.answer == answer.name}
         return {**{name: name for name in answer.echoed}, **own}
+
+    @property
+    def proof(self) -> Proof | None:
+        """How its response proves its request, None if it does not."""
+        found = self.repeated(self.response).values()
+        return next((each for each in found if isinstance(each, Proof)), None)
 
     @property
     def stopped(self) -> ByCommand | None:

@@ -36,6 +36,7 @@ from qlinkgen.plan.parts import (
     gathered,
 )
 from qlinkgen.plan.payload import Member, Step
+from qlinkgen.plan.proofs import proof_of
 from qlinkgen.plan.reading import BadFrame, Cursor, Incomplete, is_wrong, stuffed_parts
 from qlinkgen.plan.spans import Around, Cell, Dissection, Fault, Rule, Span
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing
@@ -669,6 +670,21 @@ class _TurnedWalk(_Walk):
 
     def _identify(self) -> None:
         self.message, self.number = self._known, self._known.id
+
+    def _payload(self, part: PayloadPart) -> None:
+        super()._payload(part)
+        command = self.plan.protocol.command_of(self._known.message)
+        if command is None or command.response is not self._known.message or not self.request or self.kind:
+            return
+        proof = proof_of(self.plan.protocol, command)
+        if proof is None:
+            return
+        last, right = self.spans[-1], proof.compute(self.request, self.wire)
+        if last.number != right:
+            assert isinstance(last.of, Step)
+            self.kind = "crc"
+            self.faults.append(Fault("crc", Rule.PROOF, last.places[0], last.of, last.number, right=right))
+            self.spans[-1] = replace(last, fault="crc")
 
 
 class _EndedWalk(_Walk):

@@ -71,6 +71,8 @@ class Rule(Enum):
     REFUSED = "refused"
     #: A value is legal for its field.
     VALUE = "value"
+    #: The check value of a response is that of its request and its own bytes.
+    PROOF = "proof"
 
 
 Owner = Part | Step | Member | Around

@@ -18,6 +18,7 @@ from qlinkgen.model.types import Array, Bits, Blob, Enum, Float, Length, Scalar
 from qlinkgen.schema.file_fields import Fields, FieldSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.layouts import layouts
+from qlinkgen.schema.proofs import ProofBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
@@ -44,6 +45,7 @@ class EchoBuilder:
         self._places = places
         self._report = report
         self._written: dict[Path, Fields] = {each.path: each.fields for each in layouts(file)}
+        self._proofs = ProofBuilder(frame, report)
 
     def build(self, commands: Sequence[Command]) -> list[Command]:
         """The commands, each with what its answers repeat."""
@@ -57,7 +59,7 @@ class EchoBuilder:
             if layout.kind == "answer" or (layout.kind == "message" and layout.owner in answers):
                 continue
             for name, spec in layout.fields.items():
-                if spec.repeated(name):
+                if spec.repeated(name) or spec.proves:
                     key, place = _key(spec), (*layout.path, name)
                     what = f"{key!r} has no effect in {_KINDS[layout.kind]}"
                     what = what if spec.echo else f"{_KINDS[layout.kind]} has no request to repeat"
@@ -83,6 +85,10 @@ class EchoBuilder:
             for field in answer.fields:
                 if field.repeats:
                     yield from self._repeated(answer, field, command.request)
+                elif field.proves:
+                    place = (*self._places[answer.name], field.name)
+                    spec = self._written[self._places[answer.name]][field.name]
+                    yield from self._proofs.build(command, answer, field, spec, place)
 
     def _repeated(self, answer: Message, field: Field, request: Message) -> Iterator[Echo]:
         path = self._places[answer.name]
@@ -117,7 +123,7 @@ class EchoBuilder:
 
 
 def _key(spec: FieldSpec) -> str:
-    return "echo" if spec.echo else "equals"
+    return "echo" if spec.echo else "over" if spec.proves else "equals"
 
 
 def _taken(field: Field, request: Message, part: PartBits | Value | None) -> Wrong | None:

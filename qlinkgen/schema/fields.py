@@ -48,7 +48,7 @@ class FieldBuilder:
         ``asked`` are those with a number of items from the request; ``divider`` is the separator of texts.
         """
         separated = bool(divider.byte)
-        repeated = {name: spec.repeated(name) for name, spec in specs.items()}
+        written = specs
         specs = with_counts({name: spec.itself for name, spec in specs.items()}, path, self._report)
         fields: list[Field] = []
         for name, spec in specs.items():
@@ -57,7 +57,8 @@ class FieldBuilder:
                 if not separated:
                     self._check_text(kind, (*path, name))
                 doc, confirmed = self._inherited(spec)
-                field = Field(name, kind, doc, spec.section, confirmed, repeated[name])
+                repeats, proves = written[name].repeated(name), written[name].proves
+                field = Field(name, kind, doc, spec.section, confirmed, repeats, proves)
                 of = spec.case
                 fields.append(field if of is None else replace(field, slot=of.slot, case=of.name))
         fields = with_beside(fields, specs, path, self._report)

@@ -148,7 +148,9 @@ class FieldSpec(Fact, Lifetime):
     )
     init: Id | None = Field(default=None, description="Start of the check value, if not the algorithm's")
     over: list[str] | None = Field(
-        default=None, description="Earlier fields, one after the other, that a check value covers"
+        default=None,
+        description="Earlier fields, one after the other, that a check value covers; in an answer that its "
+        "turn tells, request.NAME before them: a part of the frame of its request",
     )
     equals: str | None = Field(
         default=None,
@@ -187,12 +189,20 @@ class FieldSpec(Fact, Lifetime):
         return match["name"] if match else name if self.echo else ""
 
     @property
+    def proves(self) -> tuple[str, ...]:
+        """Parts of the frame of its request that it is a check value of, () for others."""
+        matches = (REPEATED.match(each) for each in self.over or ()) if self.algorithm is not None else ()
+        return tuple(match["name"] for match in matches if match)
+
+    @property
     def itself(self) -> FieldSpec:
-        """The field without what it repeats."""
-        if not REPEATED.match(self.equals or ""):
+        """The field without what it has from its request."""
+        keys = ["equals"] if REPEATED.match(self.equals or "") else []
+        keys += ["algorithm", "init", "over"] if self.proves else []
+        if not keys:
             return self
-        found = self.model_copy(update={"equals": None})
-        found.model_fields_set.discard("equals")
+        found = self.model_copy(update=dict.fromkeys(keys))
+        found.model_fields_set.difference_update(keys)
         return found
 
     def as_case(self, case: CaseOf, when: TestText) -> FieldSpec:

@@ -399,6 +399,12 @@ _ALL = (
         "It identifies the request that a response belongs to.",
     ),
     Rule(
+        "bad-proof",
+        "A check value that covers parts of the frame of a request is the last field of a response that its "
+        "turn tells, and covers the fields directly before it after them.",
+        "Only a master that has sent the request knows these bytes, and has them in the order of the list.",
+    ),
+    Rule(
         "unknown-attribute",
         "Attributes of commands are declared, with their values.",
         "A misspelt attribute would silently have no effect.",

@@ -12,6 +12,7 @@ from qlinkgen.link.codec import Codec, Command, Echoes, Framed, Many, Message, i
 from qlinkgen.link.many import is_endless, is_listed, nodes_asked
 from qlinkgen.link.slave_dialogue import Handling
 from qlinkgen.link.turn import is_turned
+from qlinkgen.model.transaction import Proof
 from qlinkgen.plan import Plan
 from qlinkgen.plan.codec import Codec as Interpreter
 from qlinkgen.plan.content import with_decided
@@ -135,7 +136,11 @@ class GenericNode:
         values = {**decoded.beside, **decoded.values, request.ADDRESS: decoded.address}
         command = next(each for each in interpreter.plan.commands if each.request.name == request.NAME)
         repeated = command.repeated(plan.message).items()
-        told = {name: values[of] if isinstance(of, str) else of for name, of in repeated}
+        told = {
+            name: values[of] if isinstance(of, str) else of
+            for name, of in repeated
+            if not isinstance(of, Proof)  # which the engine gives it
+        }
         settled = with_decided(plan.payload, told)
         address = self.number if message.ADDRESS else None
         wire = interpreter.encode(message.NAME, settled, address, asked)

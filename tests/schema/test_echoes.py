@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import pytest
 
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.transaction import Repeated
 from qlinkgen.schema import find, load, loads
 
 FRAME = """
@@ -24,7 +25,7 @@ bus: {kind: master_slave}
 """
 
 
-def repeated(protocol: Protocol) -> Mapping[str, str | int]:
+def repeated(protocol: Protocol) -> Mapping[str, Repeated]:
     """What the response of the first command repeats."""
     command = protocol.commands[0]
     return command.repeated(command.response)

@@ -45,6 +45,7 @@ class SlaveEntry:
         replies: functions of other answers.
         initial: statements for the response, beyond its defaults, before the function is called.
         settled: statements for the values of its frame that are always the same.
+        proven: the member of the response that is a check value of the request, "" without one.
         turn: its number in a dialogue, 0 if it begins a transaction; ``following`` is that of the next frame.
         listed: the nodes in it, each of which sends an answer; None if it has no list.
         begins: the flag of its answers without an end, "" if they have one; ``stops`` are those that it ends.
@@ -66,6 +67,7 @@ class SlaveEntry:
     replies: list[str]
     initial: list[str]
     settled: list[str]
+    proven: str
     turn: str
     following: str
     listed: Listed | None
@@ -275,6 +277,7 @@ def _entry(
         replies=replies,
         initial=_initial(command, message, answer, address) if command and answer else [],
         settled=assigned(answer, values, "slave->parts.") if answer else [],
+        proven=_proven(command, answer),
         turn=turn_name(names, message) if exchange and exchange.turn else "",
         following=turn_name(names, following) if following else "",
         listed=_listed(exchange.command) if exchange and answer else None,
@@ -295,6 +298,13 @@ def streaming(names: Names, commands: Sequence[Command], kept: Iterable[Message]
         if stop.request.name in present and not fields.intersection(command.stopped.repeats):
             found.append(Streaming(handler_name(names, command.request), command, stop))
     return found
+
+
+def _proven(command: Command | None, answer: Message | None) -> str:
+    """The member of a response that is a check value of its request, "" without one."""
+    if command is None or answer is None or command.proof is None:
+        return ""
+    return next(member(each.value) for each in command.echoes if each.of == command.proof)
 
 
 def _listed(command: Command) -> Listed | None:

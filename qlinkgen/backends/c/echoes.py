@@ -10,7 +10,7 @@ from qlinkgen.model.fields import Record, Records, Value
 from qlinkgen.model.frame import Frame, PartBits, id_pieces
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import member
-from qlinkgen.model.transaction import Command
+from qlinkgen.model.transaction import Command, Proof, Repeated
 from qlinkgen.model.types import Array, Blob, Scalar
 
 
@@ -55,11 +55,12 @@ def _repeated(command: Command, answer: Message) -> Iterator[tuple[Value, str | 
     """The fields of an answer that repeat something, and what; `slave_dispatch` fills values of frames."""
     found = command.repeated(answer)
     for value in answer.values:
-        if value.name in found and not value.field.conditional:
-            yield value, found[value.name]
+        of = found.get(value.name)
+        if of is not None and not isinstance(of, Proof) and not value.field.conditional:
+            yield value, of
 
 
-def _piece(frame: Frame, name: str, numbers: Mapping[int, str | int]) -> PartBits | None:
+def _piece(frame: Frame, name: str, numbers: Mapping[int, Repeated]) -> PartBits | None:
     """The piece of an id with a number for each id, None if it is not in one place."""
     for piece in id_pieces(frame):
         mask = (1 << piece.bits) - 1

@@ -23,6 +23,7 @@ from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.messages import Beside, MessageWriter, Rounding, nearest_helpers
 from qlinkgen.backends.c.names import Names
 from qlinkgen.backends.c.places import in_hex
+from qlinkgen.backends.c.proofs import proof_views
 from qlinkgen.backends.c.several import several
 from qlinkgen.backends.c.sizes import SizeView, size_view, sized_by_message, turn_view
 from qlinkgen.backends.c.tidy import tidy
@@ -123,6 +124,7 @@ class Header:
             *[self._message(message) for message in self._plan.messages],
             *self._checks(),
             *self._receiver(),
+            *self._proofs(),
             self._dispatch(),
         ]
         body = "".join([*self._field_checks(), *sections])
@@ -280,6 +282,11 @@ class Header:
         found = [self._frame_part(section.receiver, section.view, section.views)]
         turn = turn_view(self._plan, self._names, self._layouts)
         return found + ([self._place("turn", f=section.view, turn=turn)] if turn else [])
+
+    def _proofs(self) -> list[str]:
+        """The check values of responses that cover their request."""
+        found = proof_views(self._plan, self._names, self._layouts, self._section.view.address)
+        return [self._place("proofs", proofs=found)] if found else []
 
     def _dispatch(self) -> str:
         section, commands, role = self._section, self._plan.commands, self._plan.role

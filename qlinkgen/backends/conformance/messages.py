@@ -60,6 +60,7 @@ class Entry:
         slave_member: the member of the slave's struct that handles it, "" if none does.
         callback_member: the member of the listener's struct that receives it, "" if none does.
         turn: the number of the frame in dialogues, 0 if it is not a later one.
+        proof: bytes at the end of its response that cover the request.
     """
 
     number: int
@@ -90,6 +91,7 @@ class Entry:
     callback_member: str
     answer: Answer | None
     turn: int
+    proof: int
 
     @property
     def entry_lines(self) -> list[str]:
@@ -181,6 +183,7 @@ class Entries:
         handled, called = self._has_handler(plan), self._has_callback(plan)
         ranges = sum(isinstance(row, Wrong) and row.kind == _RANGE for row in rows)
         right = [row for row in rows if isinstance(row, Right)]
+        exchange = self._plan.protocol.exchanges.get(plan.name)
         own = MemberRows(header, stem)
         return Entry(
             number=self._numbers[message.name],
@@ -210,7 +213,8 @@ class Entries:
             slave_member=header.slave_member(message) if handled else "",
             callback_member=header.callback_member(message) if called else "",
             answer=self._answer(plan) if handled else None,
-            turn=exchange.turn if (exchange := self._plan.protocol.exchanges.get(plan.name)) else 0,
+            turn=exchange.turn if exchange else 0,
+            proof=exchange.command.proof.size if exchange and exchange.command.proof else 0,
         )
 
     def _tests(self, plan: MessagePlan, rows: Sequence[Row], found: Stream | None) -> int:

@@ -506,6 +506,8 @@ class BusModule:
             doc += ["", *textwrap.wrap(text, WIDTH - 8)]
         if repeated := [of for of in command.repeated(command.response).values() if isinstance(of, str)]:
             doc += ["", f"The response repeats {' and '.join(repeated)} of the request."]
+        if call.command.proof is not None:
+            doc += ["", "The engine gives the response its check value, which covers the request."]
         if command.response and command.addressing == "either":
             doc += ["", "Return None for a broadcast, which is not answered."]
         if _answers_once(command):

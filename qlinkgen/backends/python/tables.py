@@ -12,6 +12,7 @@ from qlinkgen.backends import python_text
 from qlinkgen.backends.python.integers import numbers_of, words_of
 from qlinkgen.backends.python.layout import WIDTH, in_hex, listing, literal, wrapped
 from qlinkgen.backends.python.names import attribute, class_name
+from qlinkgen.backends.python.place import Place
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import (
     Allowance,
@@ -24,11 +25,14 @@ from qlinkgen.model.transaction import (
     ByTime,
     Command,
     Many,
+    Proof,
+    Repeated,
     Reply,
     Step,
 )
 from qlinkgen.model.types import Array, Enum, Flags, NamedValue
 from qlinkgen.model.words import Words
+from qlinkgen.plan.proofs import ProofPlan, proof_of
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -106,12 +110,13 @@ def bus(line: Bus) -> list[str]:
     return wrapped("BUS = Bus(", [f'"{line.kind}"', *given], ")", 0)
 
 
-def command_rows(plan: Plan) -> list[list[str]]:
+def command_rows(plan: Plan, place: Place) -> list[list[str]]:
     """The rows of the transaction table, each in one or more lines."""
-    return [_row(command, plan.by_name) for command in plan.commands]
+    return [_row(command, plan, place) for command in plan.commands]
 
 
-def _row(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
+def _row(command: Command, plan: Plan, place: Place) -> list[str]:
+    kept = plan.by_name
     answer = kept.get(command.response.name) if command.response else None
     request, response = class_name(kept[command.request.name]), class_name(answer) if answer else "None"
     arguments = [f'"{command.name}"', in_hex(command.id), request, response]
@@ -135,7 +140,11 @@ def _row(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
             f"{python_text.literal(key)}: {_literal(value)}" for key, value in command.attributes.items()
         )
         arguments.append(f"attributes={{{', '.join(pairs)}}}")
-    return wrapped(f'"{command.name}": Command(', arguments, "),", 4)
+    proof = proof_of(plan.protocol, command) if answer else None
+    if proof is not None:
+        arguments = [_proof(proof, place), *arguments]
+    made = place.use("ProvenCommand") if proof else "Command"
+    return wrapped(f'"{command.name}": {made}(', arguments, "),", 4)
 
 
 def _answers(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
@@ -213,7 +222,14 @@ def _end(many: Many, kept: Mapping[str, MessagePlan]) -> str:
             assert_never(many)
 
 
-def _reply(reply: Reply, repeated: Mapping[str, str | int], planned: MessagePlan) -> str:
+def _proof(plan: ProofPlan, place: Place) -> str:
+    """The call that creates the check value of a response that covers its request."""
+    check, proof = place.check(plan.proof.algorithm), plan.proof
+    slices = tuple_of([f"({first}, {end})" for first, end in plan.slices])
+    return f'{place.use("Proof")}("{attribute(plan.value)}", {check}, {slices}, {proof.begin}, {proof.size})'
+
+
+def _reply(reply: Reply, repeated: Mapping[str, Repeated], planned: MessagePlan) -> str:
     """The call that creates a reply, with what it repeats of the request."""
     arguments = [class_name(planned), f'"{reply.means}"']
     if reply.switch:
@@ -232,11 +248,12 @@ def _time(time: Allowance) -> str:
     return f"({_number(time.byte_times)}, {_number(time.seconds)})"
 
 
-def _echoes(repeated: Mapping[str, str | int]) -> str:
+def _echoes(repeated: Mapping[str, Repeated]) -> str:
     """What the values of an answer repeat: an attribute of the request, or a number."""
     pairs = (
         f'"{attribute(name)}": ' + (str(of) if isinstance(of, int) else f'"{attribute(of)}"')
         for name, of in repeated.items()
+        if not isinstance(of, Proof)
     )
     return f"{{{', '.join(pairs)}}}"
 
@@ -248,7 +265,8 @@ def tuple_of(items: Sequence[str]) -> str:
 
 def _repetition(command: Command) -> list[str]:
     """Arguments on repetition and echoes."""
-    repeated = command.repeated(command.response)
+    found = command.repeated(command.response)
+    repeated = {name: of for name, of in found.items() if not isinstance(of, Proof)}
     facts = {
         "repeat_safe=True": command.repeat.safe,
         f'repeat_counter="{attribute(command.repeat.counter)}"': command.repeat.counter,

@@ -91,6 +91,25 @@ def draw(rng: random.Random) -> Kinds:
     return Kinds({name: frames[name] for name in mixed}, families)
 
 
+def prove(rng: random.Random, frame: Doc, fields: Doc) -> None:
+    """Let some responses end with a check value that covers pieces of the request, which is in a frame."""
+    parts: Doc = frame.get("parts", {})
+    absent = any(isinstance(spec, dict) and "if" in spec for spec in parts.values())
+    known = [name for name in ("node", "code", "data") if name in parts]
+    if not known or absent or "coding" in frame or rng.random() < 0.2:
+        return
+    algorithms = {"crc-16/xmodem": "u16", "crc-32/iso-hdlc": "u32", "xor8": "u8", "sum8-zero": "u8"}
+    algorithm, kind = rng.choice(list(algorithms.items()))
+    over = [f"request.{each}" for each in rng.sample(known, rng.randint(1, len(known)))]
+    if any(
+        isinstance(spec, dict) and spec.keys() & {"optional", "since", "until"} for spec in fields.values()
+    ):
+        return
+    name = next(each for each in ("proof", "proof_2", "proof_3") if each not in fields)
+    order = rng.choice(("big", "little"))
+    fields[name] = {"type": kind, "algorithm": algorithm, "over": [*over, *fields], "byteorder": order}
+
+
 def lead_with_ids(rng: random.Random, several: Kinds) -> None:
     """Let one kind begin with its message id, if no other kind then begins like it."""
     for family in rng.sample(several.families, len(several.families)):

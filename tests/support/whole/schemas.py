@@ -212,8 +212,10 @@ class _Maker:
             steps += [{"name": "amount", "send": asked, "within": "1 s"}, {"receive": told}]
         given = [each for step in steps for each in step.values() if isinstance(each, dict)]
         for other in (each for each in fit if "steps" not in each):
-            if rng.random() < 0.5:
-                other["response"] = {"frame": name, "fields": makes.fields(Room.of(shape)) or {"data": "u16"}}
+            if rng.random() < 0.8:
+                fields = makes.fields(Room.of(shape)) or {"data": "u16"}
+                other["response"] = {"frame": name, "fields": fields}
+                kinds.prove(rng, several.frames.get(other.get("frame", ""), {}), fields)
                 given.append(other["response"])
         if any(each.get("frame") == name for each in given):
             several.frames[name] = {"parts": {"data": {"role": "payload", "size": f"1..{most}"}}}

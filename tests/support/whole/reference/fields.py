@@ -245,7 +245,7 @@ class Fields:
             more, scale = -int(spec.get("offset", 0)), int(spec.get("scale", 1))
             unit = spec.get("counts_in", "items")
             return Slot(name, number, "count", str(spec["counts"]), unit, more=more, scale=scale)
-        if "algorithm" in spec:
+        if "algorithm" in spec and "." not in "".join(spec["over"]):
             return Slot(name, number, "filled", rule=spec, over=tuple(spec["over"]))
         if "equals" in spec and "." not in spec["equals"]:
             source = re.sub(r"[-+] *\d+|[~ ]", "", spec["equals"])
