@@ -3,7 +3,7 @@
 A test asks for a program by `require_tool("clang", package="clang")`. Without it the test is skipped, and the
 summary names the Debian package. With QLINKGEN_NO_SKIPS=1 nothing may be skipped: any skip is a failure.
 The one exception is a test that is marked `optional_tool("cbmc")` and has asked for that program by
-`optional_tool("cbmc", how="...")`; the summary tells of it all the same.
+`optional_tool("cbmc", how="...")`, or for a document in the same way; the summary tells of it all the same.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """
     config.pluginmanager.register(needs)
     config.addinivalue_line(
-        "markers", "optional_tool(name): may be skipped where this program is not to be had"
+        "markers", "optional_tool(name): may be skipped where this program or document is not to be had"
     )
     # Workers inherit it, as they must all see the same tests.
     os.environ.setdefault("QLINKGEN_SCHEMAS", str(secrets.randbelow(10**9)))
@@ -105,6 +105,20 @@ def optional_tool() -> Callable[..., str]:
         return shutil.which(tool) or pytest.skip(OPTIONAL_NOTICE.format(tool=tool, how=how))
 
     return find
+
+
+@pytest.fixture(scope="session")
+def document() -> Callable[[str], str]:
+    """Return a function that reads a source document, or skips: documents are not part of the repository."""
+    folder = Path(__file__).resolve().parents[2] / "shared" / "spec" / "source"
+
+    def read(name: str) -> str:
+        path = folder / name
+        if not path.exists():
+            pytest.skip(OPTIONAL_NOTICE.format(tool=name, how="put it into ../shared/spec/source"))
+        return path.read_text("utf-8")
+
+    return read
 
 
 @pytest.fixture(scope="session")
