@@ -9,8 +9,13 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, kind_of, shipped_kind
 from qlinkgen.cli.simulating import plan_of
+from qlinkgen.cli.wire_options import seconds
 
-BELONGS: Belongs = {"nodes": (BUS,), "echo": (BUS,), "ring": (RING,), "crc": (BUS, RING)}
+BELONGS: Belongs = {
+    **dict.fromkeys(("nodes", "echo"), (BUS,)),
+    **dict.fromkeys(("ring", "programs", "keys", "closed", "length"), (RING,)),
+    "crc": (BUS, RING),
+}
 
 
 @click.command("simulate")
@@ -21,6 +26,21 @@ BELONGS: Belongs = {"nodes": (BUS,), "echo": (BUS,), "ring": (RING,), "crc": (BU
     metavar="LIST",
     help="Nodes of a ring in order: coordinator, keypad, passive; one coordinator by default.",
 )
+@click.option(
+    "--program",
+    "programs",
+    multiple=True,
+    metavar="N=FILE",
+    help="Run a Trio BASIC program on the coordinator with address N.",
+)
+@click.option(
+    "--keys",
+    multiple=True,
+    metavar="N=KEYS",
+    help="Press keys on the keypad with address N: 1 5 enter 0.5s + 42.",
+)
+@click.option("--closed", is_flag=True, help="Connect the last node of a ring to the first: no port.")
+@click.option("--seconds", "length", callback=seconds, metavar="SECONDS", help="End a ring after this time.")
 @click.option("--link", type=click.Path(), metavar="PATH", help="Create a symbolic link to the port.")
 @click.option("--faults", metavar="SPEC", help="Faults: drop=0.01,late=0.02:0.05-0.2 or all=0.05.")
 @click.option("--seed", type=int, metavar="N", help="Seed of the faults, for reproducible runs.")
@@ -36,6 +56,10 @@ def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
     nodes: str | None,
     ring: str | None,
+    programs: tuple[str, ...],
+    keys: tuple[str, ...],
+    closed: bool,
+    length: float | None,
     link: str | None,
     faults: str | None,
     seed: int | None,
@@ -53,8 +77,13 @@ def command(  # noqa: PLR0917  # click passes them by name
     echoed fields copied from the request.
 
     trio is a ring: PORT is an additional place between the last node and the first, which then has address 1.
-    Coordinators run no program; they keep the data they receive. A keypad forwards nothing before it has its
-    offset. mc1231a is a chip set with two moving axes.
+    Coordinators keep the data they receive, and run the network words of a BASIC program given by --program.
+    A keypad forwards nothing before it has its offset. On a terminal the displays of keypads are drawn, and
+    keys are typed; with --keys or --program they are otherwise printed as {"at", "address", "display"}.
+    With --closed the ring has no port, and "port" is null; without a keyboard its time is simulated and
+    passes at once, until nothing more can happen or 10 s after the last key.
+
+    mc1231a is a chip set with two moving axes.
 
     Faults are drop, flip, truncate, delay, late, duplicate, stray, noise and silent, each with a probability
     from 0 to 1 and, after a colon, its extent; all=0.05 spreads 5 % over those not listed; to=slaves or
@@ -65,6 +94,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen simulate qlink --nodes 1,3 --baud 115200 --faults drop=0.02,flip=0.01 --seed 7
     qlinkgen simulate thermostat.yaml --nodes 1-4
     qlinkgen simulate trio --ring coordinator,keypad,coordinator --link /tmp/ring
+    qlinkgen simulate trio --ring coordinator,keypad --closed --program 1=main.bas
     qlinkgen simulate mc1231a --link /tmp/chip
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     kind = _kind(protocol, crc)
@@ -72,7 +102,17 @@ def command(  # noqa: PLR0917  # click passes them by name
     if kind is RING:
         from qlinkgen.cli.simulate_ring import simulate_ring  # noqa: PLC0415  # only for rings
 
-        simulate_ring(ring, link=link, baud=baud, plan=plan, crc=crc)
+        simulate_ring(
+            ring,
+            link=link,
+            baud=baud,
+            plan=plan,
+            crc=crc,
+            programs=programs,
+            keys=keys,
+            closed=closed,
+            seconds=length,
+        )
     elif kind is HOST:
         from qlinkgen.cli.simulate_host import simulate_host  # noqa: PLC0415
 

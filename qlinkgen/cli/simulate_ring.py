@@ -2,40 +2,91 @@
 
 from __future__ import annotations
 
-from typing import assert_never
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, assert_never
 
-from qlinkgen.cli.boundary import Failure
+import click
+
+from qlinkgen.cli.boundary import WRONG, Failure
+from qlinkgen.cli.ring_console import Console
+from qlinkgen.cli.ring_programs import programs_of, run_closed, run_open, scripts_of
 from qlinkgen.cli.simulating import run_bus, say
 from qlinkgen.cli.wire_options import counted, with_crc
 from qlinkgen.link.ring import RingCodec, RingNode
+from qlinkgen.protocols.trio.basic import ProgrammedNode
 from qlinkgen.protocols.trio.client import Node, engine_of
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.sim import FaultPlan, SimulationError
+from qlinkgen.sim.virtual_ring import VirtualRing
+
+if TYPE_CHECKING:
+    from qlinkgen.sim.port_ring import RingBus
 
 #: Default nodes of the ring.
 RING = "coordinator"
 
 
 def simulate_ring(
-    ring: str | None, *, link: str | None, baud: int | None, plan: FaultPlan | None, crc: str | None
+    ring: str | None,
+    *,
+    link: str | None,
+    baud: int | None,
+    plan: FaultPlan | None,
+    crc: str | None,
+    programs: Sequence[str] = (),
+    keys: Sequence[str] = (),
+    closed: bool = False,
+    seconds: float | None = None,
 ) -> None:
-    """Run the ring on a pty until a signal."""
+    """Run the ring until a signal, on a pty unless it is closed."""
     from qlinkgen.codecs import trio  # noqa: PLC0415  # only for Trio
-    from qlinkgen.sim.port_ring import ring_bus  # noqa: PLC0415  # needs a system that has ptys
 
     if plan is not None and plan.to != "both":
         raise Failure(f"--faults to={plan.to}: a ring has neither master nor slaves; omit to={plan.to}")
+    if closed and link is not None:
+        raise Failure(f"--link {link}: a closed ring has no port; omit --closed or --link")
     codec: RingCodec = with_crc(trio, trio.Codec, crc)
     given = RING if ring is None else ring
+    kinds = [kind.strip() for kind in given.split(",")]
+    loaded, scripts = programs_of(programs, kinds), scripts_of(keys, kinds)
+    places = [
+        ProgrammedNode(loaded[at], codec=codec, baud=baud) if at in loaded else kind
+        for at, kind in enumerate(kinds, 1)
+    ]
+    what = f"{counted(len(kinds), 'node')} of trio"
     try:
-        bus = ring_bus(given, link=link, baud=baud, faults=plan, codec=codec)
+        made = (
+            VirtualRing(places, baud=baud, faults=plan, codec=codec)
+            if closed
+            else _with_port(places, link, baud, plan, codec)
+        )
     except SimulationError as error:
         raise Failure(f"--ring {given}: {error}") from None
-    run_bus(bus, link, f"{counted(len(bus.nodes), 'node')} of trio")
-    for place, node in enumerate(bus.nodes, 1):
+    console = Console(made.wire, made.nodes, scripts)
+    if isinstance(made, VirtualRing):
+        run_closed(made, console, what=what, seconds=seconds)
+    elif not (loaded or scripts or console.drawn or seconds is not None):
+        run_bus(made, link, what)
+    else:
+        run_open(made, console, link=link, what=what, seconds=seconds)
+    for place, node in enumerate(made.nodes, 1):
         say(f"address {place}, {_account(node)}", None)
-    say(_summary(bus.nodes), plan)
+    say(_summary(made.nodes), plan)
+    if console.failed:
+        raise click.exceptions.Exit(WRONG)
+
+
+def _with_port(
+    places: Sequence[str | Node],
+    link: str | None,
+    baud: int | None,
+    plan: FaultPlan | None,
+    codec: RingCodec,
+) -> RingBus:
+    from qlinkgen.sim.port_ring import ring_bus  # noqa: PLC0415  # needs a system that has ptys
+
+    return ring_bus(places, link=link, baud=baud, faults=plan, codec=codec)
 
 
 def _account(node: Node) -> str:
@@ -45,13 +96,22 @@ def _account(node: Node) -> str:
     seen = f"{counters.taken} taken, {counters.passed} forwarded, NETSTAT {int(engine.netstat)}"
     match node:
         case CoordinatorNode():
-            return f"coordinator: {seen}{_received(node)}{_variables(node)}"
+            return f"coordinator: {seen}{_program(node)}{_received(node)}{_variables(node)}"
         case KeypadNode():
             return f"keypad: {seen}{_state(node)}"
         case RingNode():
             return f"passive: {seen}"
         case _:
             assert_never(node)
+
+
+def _program(node: CoordinatorNode) -> str:
+    if not isinstance(node, ProgrammedNode):
+        return ""
+    machine = node.machine
+    if machine.failure is not None:
+        return f"; program failed at {machine.failure.place}"
+    return "; program ended" if machine.place is None else f"; program at {machine.place}"
 
 
 def _received(node: CoordinatorNode) -> str:

@@ -33,12 +33,17 @@ def run_bus(bus: PtyBus, link: str | None, what: str) -> None:
     """Print the path of the port, run until a signal, and close the port."""
     try:
         with StopSignals(bus.request_stop):
-            click.echo(json.dumps({"port": bus.path}))
-            where = bus.path if link is None else f"{bus.path}, linked as {link}"
-            click.echo(f"qlinkgen: {what} on {where}; press Ctrl-C to stop", err=True)
+            say_port(bus.path, link, what)
             bus.run()
     finally:
         bus.close()
+
+
+def say_port(path: str | None, link: str | None, what: str) -> None:
+    """Print the first lines of a simulation, the first one for scripts."""
+    click.echo(json.dumps({"port": path}))
+    where = "" if path is None else f" on {path}" if link is None else f" on {path}, linked as {link}"
+    say(f"{what}{where}; press Ctrl-C to stop", None)
 
 
 def say(text: str, plan: FaultPlan | None) -> None:

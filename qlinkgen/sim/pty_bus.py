@@ -142,6 +142,11 @@ class PtyBus:
         self._thread.start()
         return self
 
+    @property
+    def running(self) -> bool:
+        """Whether the thread of `start` runs the line."""
+        return self._thread is not None and self._thread.is_alive()
+
     def _run_thread(self) -> None:
         with HandOver(self.fail):
             self.run()
