@@ -25,6 +25,11 @@ _SMALLEST: Mapping[str, Callable[[Any], object]] = {  # Any: a rule of the modul
     "BytesRule": lambda rule: bytes(rule.fewest),
     "TextRule": lambda rule: " " * rule.fewest,
     "ScaledRule": lambda rule: min(rule.scale.value(rule.scale.low), rule.scale.value(rule.scale.high)),
+    "FloatRule": lambda rule: rule.bounds[0] if rule.bounds else 0.0,
+    "PaddedRule": lambda rule: _smallest(rule.rule),
+    "ListRule": lambda rule: [_smallest(rule.item)] * rule.fewest,
+    "RecordRule": lambda rule: _record(rule.kind),
+    "RecordsRule": lambda rule: [_record(rule.kind) for _ in range(rule.fewest)],
 }
 #: Name of a rule class to as many smallest items as asked for.
 _REPEATED: Mapping[str, Callable[[Any, int], object]] = {  # Any: as above
@@ -167,12 +172,25 @@ def _items(message: type[Message], name: str, count: int) -> dict[str, object]:
     return {name: make(rule, count)} if make else {}
 
 
-def required_values(message: type[Message]) -> dict[str, object]:
-    """Return a legal value for each field of a message class without a default, except the address."""
+def required_values(message: Callable[..., object]) -> dict[str, object]:
+    """Return a legal value for each field of a class of messages or records that has no default.
+
+    An address is none of them.
+    """
     rules = {rule.name: rule for rule in getattr(message, "RULES", ())}
     parameters = inspect.signature(message).parameters.values()
     return {
-        each.name: _SMALLEST[type(rules[each.name]).__name__](rules[each.name])
+        each.name: _smallest(rules[each.name])
         for each in parameters
-        if each.kind is each.KEYWORD_ONLY and each.default is each.empty and each.name != message.ADDRESS
+        if each.kind is each.KEYWORD_ONLY
+        and each.default is each.empty
+        and each.name != getattr(message, "ADDRESS", "")  # which records do not have
     }
+
+
+def _smallest(rule: Any) -> object:
+    return _SMALLEST[type(rule).__name__](rule)
+
+
+def _record(kind: Callable[..., object]) -> object:
+    return kind(**required_values(kind))
