@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from qlinkgen.link.codec import Fault, Framed, Message
+from qlinkgen.link.codec import Encoder, Fault, Framed, Message, is_message
 from qlinkgen.link.host_events import Filled, InStep, OutOfStep
 
 #: Most events that an engine keeps, if the driver does not remove them.
@@ -121,6 +121,25 @@ class HealthChanged(NamedTuple):
     node: int
     #: online, suspect or offline.
     state: str
+
+
+class Frame(NamedTuple):
+    """A frame that an engine has sent or received, or received bytes that are none."""
+
+    at: float
+    sent: bool
+    #: The frame, or what was received in its place.
+    data: bytes
+    #: None for other bytes: a probe for an echo, and what `fault` is about.
+    message: Message | None = None
+    fault: Fault | None = None
+
+
+def heard(event: Framed | Fault, at: float, codec: Encoder) -> Frame:
+    """Return what was received, as a frame."""
+    if is_message(event):
+        return Frame(at, False, codec.encode(event), event)
+    return Frame(at, False, event.raw, None, event)
 
 
 #: The last three are events of host ports only.

@@ -49,12 +49,14 @@ from qlinkgen.link.events import (
     EchoFound,
     Event,
     Failed,
+    Frame,
     HealthChanged,
     OtherAnswer,
     Refused,
     Sent,
     Stray,
     TimedOut,
+    heard,
 )
 from qlinkgen.link.gaps import Gap
 from qlinkgen.link.health import HealthBook, HealthPolicy
@@ -101,6 +103,7 @@ class MasterEngine:
         health: state of each node.
         numbering: the counter of its frames, None without one.
         own: its number, where frames have a destination and a source.
+        frames: each frame, oldest first, which the driver removes; None, unless somebody is told.
         streams: answers that come until another command stops them.
         break_time: seconds of the break that a driver sends before each frame, 0 for none.
     """
@@ -126,6 +129,7 @@ class MasterEngine:
         self.timing = timing
         self.events: deque[Event] = deque(maxlen=EVENTS_KEPT)
         self.verbose = True
+        self.frames: deque[Frame] | None = None
         self.counters: dict[int | None, LinkCounters] = {None: LinkCounters()}
         self._broadcast = codec.BUS.broadcast
         self.health = HealthBook(health, untracked=(None, self._broadcast))
@@ -386,6 +390,8 @@ class MasterEngine:
     def _send_probe(self, now: float) -> bytes:
         if self._probe.until:
             return b""
+        if self.frames is not None:
+            self.frames.append(Frame(now, True, PROBE))
         return self._probe.send(now + self.timing.on_wire(len(PROBE)) + self._line.quiet)
 
     def _send(self, now: float) -> bytes:
@@ -407,6 +413,8 @@ class MasterEngine:
         self._line.suspect = False
         if self.verbose:
             self.events.append(Sent(now, pending.node, pending.request, number, frame))
+        if self.frames is not None:
+            self.frames.append(Frame(now, True, frame, pending.request))
         on_wire = len(frame) * self._byte_time + self.break_time
         if not pending.is_answered:
             if self._paced or self._gap.span:
@@ -453,6 +461,8 @@ class MasterEngine:
         self._line.suspect = False
         if self.verbose:
             self.events.append(Sent(now, pending.node, message, self._attempts.number, frame))
+        if self.frames is not None:
+            self.frames.append(Frame(now, True, frame, message))
         on_wire = len(frame) * self._byte_time + self.break_time
         self._earliest = now + EARLY * on_wire if self._paced else now
         self._go_on(dialogue, now, on_wire)
@@ -501,6 +511,8 @@ class MasterEngine:
     def _take_in(self, event: Framed | Fault, now: float) -> None:
         if self._echo.broken and self._is_own(event):
             return
+        if self.frames is not None:
+            self.frames.append(heard(event, now, self.codec))
         if is_message(event) and not self.own.takes(event):
             self._stray(event, now)
             return

@@ -12,7 +12,7 @@ from typing import Literal
 
 from qlinkgen.link.codec import Codec, DecoderCounters, Fault, Framed, is_message
 from qlinkgen.link.counters import LinkCounters
-from qlinkgen.link.events import Event
+from qlinkgen.link.events import Event, Frame
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.slave import Node, SlaveEngine
 from qlinkgen.link.timing import Timing
@@ -127,6 +127,15 @@ class PeerEngine:
     @verbose.setter
     def verbose(self, value: bool) -> None:
         self.master.verbose = value
+
+    @property
+    def frames(self) -> deque[Frame] | None:
+        """Each frame of both halves, oldest first, which the driver removes; None: not kept."""
+        return self.master.frames
+
+    @frames.setter
+    def frames(self, value: deque[Frame] | None) -> None:
+        self.master.frames = self.slave.frames = value
 
     @property
     def break_time(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Generator, Iterable, Sequence
 from typing import Any, Literal, Protocol, cast
 
@@ -20,6 +21,7 @@ from qlinkgen.link.codec import (
     wrong_size,
 )
 from qlinkgen.link.echo import EchoCanceller
+from qlinkgen.link.events import Frame, heard
 from qlinkgen.link.gaps import Gap, break_of, silence_of
 from qlinkgen.link.many import nodes_asked
 from qlinkgen.link.numbering import numbering_of, repeat, repeated_of
@@ -32,6 +34,8 @@ __all__ = ["PENDING", "Node", "Refusal", "SlaveCounters", "SlaveEngine"]
 
 #: Bytes that stuffing may insert into the answer of another node, and not into that of this one.
 _INSERTED = 2
+#: Most answers that are made before the first of them is sent, of which a trace names the message.
+_NAMED = 256
 
 
 class Node(Protocol):
@@ -94,6 +98,7 @@ class SlaveEngine:
         node: the behaviour of the node.
         counters: counts of frames.
         numbering: the counter of its frames, None without one.
+        frames: each frame, oldest first, which the driver removes; None, unless somebody is told.
         break_time: seconds of the break that a driver sends before each frame, 0 for none.
     """
 
@@ -132,6 +137,10 @@ class SlaveEngine:
             raise ValueError(f"turnaround must be 0 s or more and finite, not {turnaround}")
         self.node = node
         self.counters = SlaveCounters()
+        self.frames: deque[Frame] | None = None
+        #: The last answers by their bytes, if somebody is told of frames.
+        self._made: dict[bytes, Message] = {}
+        self._codec = codec
         self._encode = codec.encode
         self.numbering = numbering_of(codec)
         self._repeated = repeated_of(codec)
@@ -205,6 +214,8 @@ class SlaveEngine:
 
     def _sort(self, events: Sequence[Framed | Fault], now: float) -> None:
         for event in events:
+            if self.frames is not None:
+                self.frames.append(heard(event, now, self._codec))
             if is_message(event):
                 self._heard(event, now)
             else:
@@ -223,7 +234,7 @@ class SlaveEngine:
             self.counters.unknown += 1
             self._request = None
             self._further = []
-            self._answer = self._encode(answer)
+            self._answer = self._named(answer, self._encode(answer))
             self._due = now + self._turnaround
 
     def _heard(self, request: Framed, now: float) -> None:
@@ -345,7 +356,15 @@ class SlaveEngine:
         repeat(self._repeated, request, response)
         if self.numbering is not None:
             self.numbering.answer(response)
-        return self._encode(response)
+        return self._named(response, self._encode(response))
+
+    def _named(self, response: Message, data: bytes) -> bytes:
+        """Remember which answer these bytes are, if somebody is told of frames."""
+        if self.frames is not None:
+            self._made[data] = response
+            if len(self._made) > _NAMED:
+                del self._made[next(iter(self._made))]
+        return data
 
     def _fill(self, request: Framed, response: Message) -> None:
         """Give an answer what it repeats of the request that began its transaction."""
@@ -403,6 +422,8 @@ class SlaveEngine:
         pause = max(self._turnaround, self._gap.span)
         self._due = now + len(answer) * self._byte_time + self.break_time + pause
         self.counters.answers += 1
+        if self.frames is not None:
+            self.frames.append(Frame(now, True, answer, self._made.get(answer)))
         if self._echo.mode == "expect":
             self._echo.sent(answer)
         return answer
