@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import AsyncGenerator, Callable
-from contextlib import ExitStack, aclosing, suppress
+from collections.abc import AsyncGenerator, AsyncIterator, Callable
+from contextlib import ExitStack, aclosing, asynccontextmanager, suppress
+from contextvars import ContextVar
 from types import TracebackType
 from typing import Any, Self, TypeVar, assert_never
 
@@ -22,6 +23,8 @@ from qlinkgen.transport.conversation import Asker, MasterDriver, conversation, s
 from qlinkgen.transport.port import Port
 
 _Result = TypeVar("_Result")
+#: Transactions of several calls that the current task is in, on whatever bus.
+_BLOCKS: ContextVar[tuple[object, ...]] = ContextVar("_BLOCKS", default=())
 
 
 class AsyncMaster(MasterDriver):
@@ -36,6 +39,40 @@ class AsyncMaster(MasterDriver):
     def __init__(self, engine: Asker, port: Port, *, on_event: Callable[[Event], None] | None = None) -> None:
         super().__init__(engine, port, on_event)
         self._lock = asyncio.Lock()
+        self._calls = asyncio.Lock()  # of a transaction, or of a call outside of it
+        self._held: object = None  # the current transaction
+
+    @asynccontextmanager
+    async def transaction(self) -> AsyncIterator[None]:
+        """Keep the other tasks off the line during a block of several calls.
+
+        Tasks that the block begins belong to it, and blocks may be nested. The answers of a stream wait too.
+        """
+        if self._belongs:
+            yield
+            return
+        async with self._calls:
+            self._held = mine = object()
+            token = _BLOCKS.set((*_BLOCKS.get(), mine))
+            try:
+                yield
+            finally:
+                self._held = None
+                _BLOCKS.reset(token)
+
+    @property
+    def _belongs(self) -> bool:
+        """Whether the current task is in the current transaction."""
+        return self._held is not None and self._held in _BLOCKS.get()
+
+    @asynccontextmanager
+    async def _hold(self) -> AsyncIterator[None]:
+        """Hold the port, and report events."""
+        async with self.transaction(), self._lock:
+            try:
+                yield
+            finally:
+                self._report()
 
     async def transact(self, request: Question, *, attempts: int | None = None, trial: bool = False) -> Reply:
         """Send a request, and return the answer with the number of attempts and the time taken.
@@ -49,6 +86,12 @@ class AsyncMaster(MasterDriver):
             PortLost: the port was lost.
             EncodeError: of the generated module; nothing was sent.
         """
+        if not self._belongs:
+            async with self._calls:
+                return await self._transact(request, attempts, trial=trial)
+        return await self._transact(request, attempts, trial=trial)
+
+    async def _transact(self, request: Question, attempts: int | None, *, trial: bool) -> Reply:
         async with self._lock:
             steps = conversation(self.engine, self.port, request, attempts, trial=trial)
             try:
@@ -75,9 +118,8 @@ class AsyncMaster(MasterDriver):
                     yield stream.answers.popleft()
                 if stream.ended:
                     break
-                async with self._lock:
+                async with self._hold():
                     self._heard(stream, await read(self.port, self._wait_for(stream)))
-                    self._report()
         except PortLost:
             stream = None
             raise

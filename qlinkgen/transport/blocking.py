@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from types import TracebackType
 from typing import Any, Self, assert_never
 
@@ -98,6 +98,13 @@ class BlockingMaster(MasterDriver):
                 self.transact(stream.stop)
         if stream is not None and stream.error is not None:
             raise stream.error
+
+    def transaction(self) -> AbstractContextManager[None]:
+        """Keep the other threads off the line during a block of several calls.
+
+        Blocks may be nested. The answers of a stream, and the requests of the other side of a link, wait too.
+        """
+        return self._hold()
 
     @contextmanager
     def _hold(self) -> Iterator[None]:

@@ -113,7 +113,12 @@ class MasterDriver:
     @on_event.setter
     def on_event(self, function: Callable[[Event], None] | None) -> None:
         self._on_event = function
-        self.engine.verbose = function is not None
+        self.engine.verbose = self._tells
+
+    @property
+    def _tells(self) -> bool:
+        """Whether somebody is told of every event."""
+        return self._on_event is not None
 
     def _report(self) -> None:
         events = self.engine.events

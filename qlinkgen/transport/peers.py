@@ -1,4 +1,4 @@
-"""The drivers of one side of a link whose sides both ask.
+"""The blocking driver of one side of a link whose sides both ask; `aio_peers` has that for asyncio.
 
 Requests of the other side are answered while this one asks, and between that while `serve` runs, in another
 thread or task. Handlers are called wherever bytes are read, and must not send requests themselves.
@@ -11,8 +11,6 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 
 from qlinkgen.link.transaction import Question, Reply
-from qlinkgen.transport import aio
-from qlinkgen.transport.aio import AsyncMaster
 from qlinkgen.transport.blocking import BlockingMaster
 from qlinkgen.transport.serving import serving
 
@@ -60,20 +58,3 @@ class BlockingPeer(BlockingMaster):
         finally:
             self._asking = None
             self._lock.release()
-
-
-class AsyncPeer(AsyncMaster):
-    """Asks and answers on one port; its engine is a `PeerEngine`. Tasks of one event loop may use it."""
-
-    async def serve(self) -> None:
-        """Answer requests of the other side until the task is cancelled.
-
-        Raises:
-            PortLost: the port was lost.
-        """
-        steps, timeout = serving(self.port, self.engine), 0.0
-        next(steps)
-        while True:
-            async with self._lock:
-                timeout = steps.send(await aio.read(self.port, min(timeout, TURN)))
-                self._report()
