@@ -138,9 +138,7 @@ def echo_mode(protocol: Protocol, given: str | None) -> EchoMode:
     """Return the given mode; else a probe, unless its bytes could begin a frame."""
     if given is not None:
         return cast(EchoMode, given)
-    kinds = [each.envelope.starts for each in frame_plan(protocol.frame).sought]
-    told = all(starts and not any(each.startswith(PROBE[:1]) for each in starts) for starts in kinds)
-    return "auto" if told else "none"
+    return "auto" if frame_plan(protocol.frame).skips(PROBE[:1]) else "none"
 
 
 def counted(number: int, what: str) -> str:

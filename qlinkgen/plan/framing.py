@@ -169,6 +169,11 @@ class FramePlan:
         """Whether check values cover attributes of messages."""
         return any(each.envelope.seeded for each in self.every)
 
+    def skips(self, byte: bytes) -> bool:
+        """Whether receivers skip a byte between frames: each kind has a beginning, which is another one."""
+        kinds = [each.envelope.starts for each in self.sought]
+        return all(starts and not any(each.startswith(byte) for each in starts) for starts in kinds)
+
     @property
     def needs_request(self) -> bool:
         """Whether a response can be decoded only with its request."""
