@@ -1,0 +1,85 @@
+"""Keyword arguments of buses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from logging import Logger
+from typing import Literal, TypedDict
+
+from qlinkgen.link.echo import EchoMode
+from qlinkgen.link.events import Event, Frame
+from qlinkgen.link.health import HealthPolicy
+
+Parity = Literal["none", "even", "odd"]
+
+
+class Observers(TypedDict, total=False):
+    """Who is told what happens on a port.
+
+    on_event: called with each event, in the calling thread or task.
+    on_frame: called with each frame, sent or received, and with bytes that are none.
+    logger: gets a record of each event with its values as attributes (`extra`); None: nothing is logged.
+    """
+
+    on_event: Callable[[Event], None] | None
+    on_frame: Callable[[Frame], None] | None
+    logger: Logger | None
+
+
+class AskingOptions(TypedDict, total=False):
+    """Options of an engine that asks.
+
+    attempts: most transmissions of a request, the first included; 3 by default.
+    slack: largest delay in seconds that driver, adapter and operating system add to a transaction; by default
+        derived from the port.
+    """
+
+    attempts: int
+    slack: float | None
+
+
+class MasterOptions(AskingOptions, total=False):
+    """Options of the engine of a master.
+
+    echo: whether the adapter echoes sent bytes: `expect`, `none`, or `auto` to probe with two zero bytes
+        before the first request, the default where no frame begins with them.
+    health: when a silent node is offline; None: never.
+    number: the number of the master, where frames have a destination and a source.
+    """
+
+    echo: EchoMode
+    health: HealthPolicy | None
+    number: int | None
+
+
+class PeerOptions(AskingOptions, total=False):
+    """Options of the engine of one side of a link whose sides both ask.
+
+    turnaround: seconds from a request to its answer.
+    """
+
+    turnaround: float
+
+
+class BusOptions(MasterOptions, Observers, total=False):
+    """Options of a bus."""
+
+
+class LinkOptions(PeerOptions, Observers, total=False):
+    """Options of one side of a link."""
+
+
+class SlaveOptions(TypedDict, total=False):
+    """Options of slaves.
+
+    turnaround: seconds from a request to its answer, so that the master can release the line.
+    echo: whether the adapter echoes sent bytes.
+    slack: largest delay in seconds with which bytes of one frame arrive; where only a silence ends a frame,
+        slaves wait for it that much longer. By default derived from the port.
+    on_frame: called with each frame, sent or received, and with bytes that are none.
+    """
+
+    turnaround: float
+    echo: Literal["expect", "none"]
+    slack: float | None
+    on_frame: Callable[[Frame], None] | None

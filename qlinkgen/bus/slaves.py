@@ -1,0 +1,161 @@
+"""Slaves of any protocol on a port."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Literal, Self, Unpack
+
+from qlinkgen.bus.making import open_line
+from qlinkgen.bus.options import Parity, SlaveOptions
+from qlinkgen.bus.watching import tell_frames, trace
+from qlinkgen.errors import PortLost
+from qlinkgen.link.codec import Codec
+from qlinkgen.link.events import Frame
+from qlinkgen.link.slave import Node, SlaveEngine
+from qlinkgen.transport.conversation import host_slack
+from qlinkgen.transport.opening import closing_on_error
+from qlinkgen.transport.port import Port
+from qlinkgen.transport.serving import serving
+
+
+class Slave:
+    """One slave or several on a port, each of which is an object with a method for each command.
+
+    Example:
+        >>> Slave.serve("/dev/ttyUSB0", Oven(3))  # doctest: +SKIP
+
+    Attributes:
+        codec: the generated module of the protocol.
+        port: the port.
+        engines: the engine of each slave, with its counters.
+        on_frame: called with each frame; None, unless somebody is told of them.
+    """
+
+    codec: Codec
+
+    def __init__(
+        self,
+        port: Port,
+        *handlers: Node,
+        turnaround: float = 0.0,
+        echo: Literal["expect", "none"] = "none",
+        slack: float | None = None,
+        on_frame: Callable[[Frame], None] | None = None,
+    ) -> None:
+        """Take ownership of a port; closing the slave closes it. The options are in `qlinkgen.bus.options`.
+
+        Raises:
+            ValueError: handlers are missing, or an option is out of range.
+        """
+        if not handlers:
+            raise ValueError("no handlers: pass an object of a subclass of SlaveHandlers for each slave")
+        self.port = port
+        self.on_frame = on_frame
+        late = host_slack(port) if slack is None else slack
+        self.engines = [
+            SlaveEngine(self.codec, each, turnaround=turnaround, baud=port.baud, echo=echo, host_slack=late)
+            for each in handlers
+        ]
+        trace(self.engines[0], on_frame)  # all hear the same
+        for engine in self.engines[1:]:
+            engine.frames = self.engines[0].frames
+
+    @classmethod
+    def open(
+        cls,
+        name: str,
+        *handlers: Node,
+        baud: int | None = None,
+        parity: Parity = "none",
+        stop_bits: int = 1,
+        **options: Unpack[SlaveOptions],
+    ) -> Self:
+        """Open a device name or a URL of pyserial; the arguments are those of `Bus.open`."""
+        opened = open_line(cls.codec, name, baud=baud, parity=parity, stop_bits=stop_bits, reopen=False)
+        with closing_on_error(opened) as port:
+            return cls(port, *handlers, **options)
+
+    @classmethod
+    def serve(
+        cls,
+        name: str,
+        *handlers: Node,
+        stop: Callable[[], bool] = lambda: False,
+        baud: int | None = None,
+        parity: Parity = "none",
+        stop_bits: int = 1,
+        **options: Unpack[SlaveOptions],
+    ) -> None:
+        """Open a port and answer there until `stop()` is true, by default as long as the port exists.
+
+        Raises:
+            PortLost: the port was lost.
+        """
+        with cls.open(name, *handlers, baud=baud, parity=parity, stop_bits=stop_bits, **options) as slave:
+            slave.run(stop)
+
+    def run(self, stop: Callable[[], bool] = lambda: False) -> None:
+        """Answer until `stop()` is true.
+
+        Raises:
+            PortLost: the port was lost.
+        """
+        steps = serving(self.port, *self.engines)
+        timeout = next(steps)
+        while not stop():
+            timeout = steps.send(self.port.read(timeout))
+            tell_frames(self.engines[0], self.on_frame)
+
+    async def run_async(self, stop: Callable[[], bool] = lambda: False) -> None:
+        """Answer in an event loop until `stop()` is true, or the task is cancelled.
+
+        Raises:
+            PortLost: the port was lost.
+        """
+        from qlinkgen.transport import aio  # noqa: PLC0415  # importing asyncio takes 50 ms
+
+        steps = serving(self.port, *self.engines)
+        timeout = next(steps)
+        while not stop():
+            timeout = steps.send(await aio.read(self.port, timeout))
+            tell_frames(self.engines[0], self.on_frame)
+
+    @contextmanager
+    def running(self) -> Iterator[Self]:
+        """Answer in a thread during a block.
+
+        Raises:
+            PortLost: the port was lost meanwhile.
+        """
+        stopped, lost = threading.Event(), list[PortLost]()
+
+        def run() -> None:
+            try:
+                self.run(stopped.is_set)
+            except PortLost as error:
+                lost.append(error)
+
+        thread = threading.Thread(target=run, name="slave", daemon=True)
+        thread.start()
+        try:
+            yield self
+        finally:
+            stopped.set()
+            thread.join()
+        if lost:
+            raise lost[0]
+
+    def close(self) -> None:
+        """Close the port."""
+        self.port.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace_: TracebackType | None
+    ) -> None:
+        self.close()
