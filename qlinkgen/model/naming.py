@@ -23,10 +23,11 @@ _IN_FUNCTIONS = frozenset(
     """as_bytes bytes cls data frame head illegal len message number payload struct_error
     wrong_size""".split()  # noqa: SIM905 - reads better than quoted words
 )
-#: Attributes of the classes of calls and handlers, and types of arguments.
+#: Attributes of the classes of calls and handlers, and of those in `qlinkgen.bus`; types of arguments.
 _IN_CALLS = frozenset(
     """ask ask_any ask_each ask_many ask_steps ask_stream tell handle number axis bool bytes dict float int
-    list str tuple type""".split()  # noqa: SIM905
+    list str tuple type accepts after_fork bus close codec engine iterate logger node on_event on_frame open
+    port run serve stream transact transaction usual_echo watch""".split()  # noqa: SIM905
 )
 #: Classes, constants and imports of a codec, and constants in the body of a message class.
 _IN_MODULE = frozenset(

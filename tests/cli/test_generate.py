@@ -137,7 +137,7 @@ def test_bus_modules_are_in_the_package_of_the_codecs(qlinkgen: Run, out: Path) 
     assert qlinkgen("generate", "qlink", "-o", out).code == 0
     assert qlinkgen("generate", "trio", "-o", out).code == 0
     folder = out / "python/codecs"
-    assert files(folder) == {*SHARED, "qlink.py", "qlink_bus.py", "trio.py"}
+    assert files(folder) == {*SHARED, "_qlink_aio.py", "_qlink_bus.py", "qlink.py", "qlink_bus.py", "trio.py"}
     (folder / "qlink_bus.py").write_text("spoilt")
     result = qlinkgen("generate", "qlink", "-o", out, "--check")
     assert (result.code, "codecs/qlink_bus.py: differs" in result.out) == (1, True)

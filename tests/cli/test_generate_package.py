@@ -16,7 +16,10 @@ from tests.cli.conftest import Run
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PYTHON = ("--target", "python", "--target", "bus")
-MODULES = {"__init__.py", "_checks.py", "_support.py", "py.typed", "thermo.py", "thermo_bus.py"}
+MODULES = {
+    "__init__.py", "_checks.py", "_support.py", "_thermo_aio.py", "_thermo_bus.py", "py.typed", "thermo.py",
+    "thermo_bus.py",
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -48,15 +51,18 @@ def test_the_layout(qlinkgen: Run, out: Path, thermo: Path, package: str) -> Non
 
 
 def test_all_imports_are_relative_or_of_the_standard_library(qlinkgen: Run, out: Path, thermo: Path) -> None:
+    """Only the modules that open ports need qlinkgen, and of it the buses."""
     qlinkgen("generate", thermo, "qlink", "trio", "mc1231a", *PYTHON, "--package", "my.wire", "-o", out)
     found = set()
     for file in (out / "my/wire").glob("*.py"):
+        opens = file.name in {"_thermo_aio.py", "_thermo_bus.py", "_qlink_aio.py", "_qlink_bus.py"}
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.Import):
                 found |= {name.name.partition(".")[0] for name in node.names}
             elif isinstance(node, ast.ImportFrom) and not node.level:
+                assert str(node.module).startswith("qlinkgen.bus.") == (opens and node.module != "__future__")
                 found.add(str(node.module).partition(".")[0])
-    assert found <= sys.stdlib_module_names
+    assert found - {"qlinkgen"} <= sys.stdlib_module_names
     assert not [path for path in out.rglob("*") if "qlinkgen" in path.name]
 
 

@@ -331,8 +331,12 @@ def test_a_side_and_commands_can_be_left_out() -> None:
         chosen = Options(**options)
         return loaded(model, load(model, chosen), chosen)
 
-    assert public(role="master").__all__ == sorted(CALLERS)
-    assert public(role="slave").__all__ == ["SlaveHandlers"]
+    askers = ["AsyncBus", "AsyncNode", "Bus", "Node"]
+    assert public(role="master").__all__ == sorted([*CALLERS, *askers])
+    assert public(role="slave").__all__ == ["Slave", "SlaveHandlers"]
+    made = bus.generate(model, Options(role="slave"))
+    assert [Path(path).name for path in made] == ["qlink_bus.py", "_qlink_bus.py", "__init__.py", "py.typed"]
+    assert "class Bus" not in made["python/codecs/_qlink_bus.py"]
     small = public(only=("motion", "node_info.response"))
     assert hasattr(small.MasterCalls, "motion")
     assert not hasattr(small.MasterCalls, "node_info")
@@ -373,14 +377,15 @@ def small(commands: str, *, addressed: bool) -> tuple[Any, Any]:
 def test_without_addresses_there_is_one_slave() -> None:
     commands = "commands: {go: {id: 1, request: {speed: u8}, response: {}}}"
     codec, made = small(commands, addressed=False)
-    assert made.__all__ == ["AsyncMasterCalls", "MasterCalls", "SlaveHandlers"]
+    askers = ["AsyncDevice", "AsyncMasterCalls", "Device", "MasterCalls"]
+    assert made.__all__ == [*askers, "Slave", "SlaveHandlers"]
     calls, notes = recorder(made.MasterCalls, 0)
     calls.go(speed=3)
     assert notes == [(codec.GoRequest(speed=3), codec.GoResponse)]
 
 
 def test_commands_may_have_the_names_of_members_of_a_class() -> None:
-    words = ("ask", "tell", "handle", "number", "bytes", "list", "str")
+    words = ("ask", "tell", "handle", "number", "bytes", "list", "str", "open", "close", "run", "node")
     rows = [
         f"  {word}: {{id: {at}, request: {{x: 'bytes[0..2]'}}, response: {{}}}}"
         for at, word in enumerate(words)

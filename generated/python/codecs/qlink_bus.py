@@ -54,11 +54,19 @@ if TYPE_CHECKING:
 
     _R = TypeVar("_R", bound=Message)
 
+    from ._qlink_aio import AsyncBus, AsyncNode
+    from ._qlink_bus import Bus, Node, Slave
+
 __all__ = [
+    "AsyncBus",
     "AsyncMasterCalls",
+    "AsyncNode",
     "AsyncNodeCalls",
+    "Bus",
     "MasterCalls",
+    "Node",
     "NodeCalls",
+    "Slave",
     "SlaveHandlers",
 ]
 
@@ -1063,3 +1071,25 @@ _METHODS: dict[type[Message], str] = {
     ClearOutputsRequest: "clear_outputs",
     LoopBackRequest: "loop_back",
 }
+
+
+#: Modules of the classes that open ports, which import qlinkgen.
+_PORTS = {
+    "AsyncBus": "_qlink_aio",
+    "AsyncNode": "_qlink_aio",
+    "Bus": "_qlink_bus",
+    "Node": "_qlink_bus",
+    "Slave": "_qlink_bus",
+}
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        """Import a class that opens ports when it is first used."""
+        if name not in _PORTS:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from importlib import import_module
+
+        found: object = getattr(import_module(f".{_PORTS[name]}", __package__), name)
+        globals()[name] = found
+        return found

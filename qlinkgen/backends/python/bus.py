@@ -1,14 +1,15 @@
 """Bus modules: a typed method for each command, for masters and hosts to call and for slaves to override.
 
 The module `X_bus` is generated next to the codec `X` and uses its classes. A runtime implements sending; the
-module does not depend on ports, clocks or threads.
+module does not depend on ports, clocks or threads. Those that do are in `qlinkgen.backends.python.ports`.
 """
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from qlinkgen.backends import python_text
 from qlinkgen.backends.base import Options, Outputs, banner
@@ -17,6 +18,7 @@ from qlinkgen.backends.python.fitted import fitted
 from qlinkgen.backends.python.layout import WIDTH, wrapped
 from qlinkgen.backends.python.names import attribute, class_name, held, imported
 from qlinkgen.backends.python.place import Place, place_of
+from qlinkgen.backends.python.ports import Asker, Ports
 from qlinkgen.backends.python.sections import templates
 from qlinkgen.model.fields import Value
 from qlinkgen.model.naming import file_stem, method, pascal
@@ -102,19 +104,27 @@ def sides_of(protocol: Protocol, calls: Sequence[Transaction]) -> list[Side]:
 
 
 def generate(protocol: Protocol, options: Options) -> Outputs:
-    """The module of a protocol and the files of its package, by path; nothing without commands."""
-    text = render(plan_of(protocol, options))
-    return {f"{options.package}/{protocol.name}_bus.py": text, **package(options)} if text else {}
+    """The modules of a protocol and the files of its package, by path; nothing without commands."""
+    made = _module(plan_of(protocol, options))
+    if made is None:
+        return {}
+    texts = {f"{protocol.name}_bus": made.text(), **dict(made.ports.texts())}
+    return {**{f"{options.package}/{name}.py": text for name, text in texts.items()}, **package(options)}
 
 
 def render(plan: Plan) -> str:
-    """The text of a protocol's module, "" if it would be empty."""
+    """The text of a protocol's bus module, "" if it would be empty."""
+    made = _module(plan)
+    return made.text() if made else ""
+
+
+def _module(plan: Plan) -> BusModule | None:
     bus = plan.protocol.bus
     if bus.kind == "ring" or (bus.kind == "host" and plan.role == "slave"):
-        return ""
+        return None
     calls = [Transaction.of(plan, command) for command in plan.commands]
     kept = [call for call in calls if call is not None]
-    return BusModule(plan, kept).text() if kept else ""
+    return BusModule(plan, kept) if kept else None
 
 
 @dataclass(frozen=True)
@@ -173,6 +183,8 @@ class BusView:
     #: Kinds of several answers: each, many, stream.
     several: set[str]
     dialogues: bool
+    #: Classes that open ports, by module.
+    ports: Mapping[str, Sequence[str]]
 
 
 class BusModule:
@@ -186,6 +198,22 @@ class BusModule:
         self._sides = sides_of(plan.protocol, transactions)
         self._place: Place = place_of(plan)
         self._classes = {"Message"}
+
+    @cached_property
+    def ports(self) -> Ports:
+        """The modules with classes that open ports."""
+        asks, answers = self._plan.role != "slave", self._plan.role != "master"
+        askers = [self._asker(side) for side in self._sides if side.asked] if asks else []
+        slave = answers and any(side.answered for side in self._sides)
+        return Ports(self._plan, askers, slave=slave, nodes=self._nodes())
+
+    def _asker(self, side: Side) -> Asker:
+        """The classes of a side that open ports: those of a bus, or of a device if frames have no address."""
+        both, several = self._protocol.both_ask, len(self._sides) > 1
+        prefix = side.asks if several else ""
+        one = f"{prefix}Node" if self._place.address else ""
+        name = "Peer" if both else "Bus" if one else "Device"
+        return Asker(prefix or name, f"{side.asks}Calls", one, f"{prefix}NodeCalls", both)
 
     def text(self) -> str:
         """The module's text."""
@@ -210,7 +238,10 @@ class BusModule:
             else [f"{source}(", *(f"    {each}," for each in classes), ")"],
             decimals="Decimal" in self._place.used,
             new="NEW" in self._place.used,
-            public=sorted([*(each.name for each in callers), *(each.name for each in servers)]),
+            public=sorted(
+                [*(each.name for each in callers), *(each.name for each in servers)]
+                + [name for names in self.ports.names.values() for name in names]
+            ),
             callers=callers,
             servers=servers,
             nodes=f", {self._nodes()}" if self._nodes() else "",
@@ -218,6 +249,7 @@ class BusModule:
             abstract=self._abstract(callers=bool(callers), servers=bool(servers)),
             several=self._several,
             dialogues=any(each.command.steps for each in self._transactions),
+            ports=self.ports.names,
         )
         template = templates().get_template("templates/bus.j2")
         return fitted(template.render(vars(view)).rstrip("\n") + "\n")

@@ -1,0 +1,155 @@
+"""Port modules: masters and slaves that open a port, of the classes in `qlinkgen.bus`.
+
+The modules `_X_bus` and `_X_aio` are generated next to the bus module `X_bus`, which imports them when one of
+their classes is first used: it needs nothing of qlinkgen otherwise. They are printed by one template.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from qlinkgen.backends import python_text
+from qlinkgen.backends.base import banner
+from qlinkgen.backends.python.layout import WIDTH
+from qlinkgen.backends.python.sections import templates
+from qlinkgen.model.naming import file_stem
+from qlinkgen.model.texts import one_line
+from qlinkgen.plan import Plan
+from qlinkgen.plan.ends import InStep
+from qlinkgen.plan.framing import frame_plan
+
+#: A byte that is sent to look for an echo, where receivers skip it.
+_PROBE = b"\0"
+
+
+@dataclass(frozen=True)
+class Asker:
+    """A class of calls of the bus module, for which there is a class that opens a port.
+
+    Attributes:
+        name: name of that class.
+        calls: name of the class of calls.
+        node: name of the class of one node, "" without addresses.
+        node_calls: name of its class of calls.
+        both: the other side asks, too.
+    """
+
+    name: str
+    calls: str
+    node: str = ""
+    node_calls: str = ""
+    both: bool = False
+
+
+@dataclass(frozen=True)
+class _View:
+    """A class as the template prints it."""
+
+    name: str
+    base: str
+    calls: str
+    doc: Sequence[str]
+    node: str
+    node_calls: str
+    echo: str
+
+
+class Ports:
+    """The port modules of a protocol."""
+
+    def __init__(self, plan: Plan, askers: Sequence[Asker], *, slave: bool, nodes: str) -> None:
+        """Name what the bus module has.
+
+        Args:
+            plan: the plan of the protocol.
+            askers: its classes of calls.
+            slave: whether it has handlers of a slave.
+            nodes: addresses of nodes as text.
+        """
+        self._protocol = plan.protocol
+        frame = frame_plan(plan.protocol.frame)
+        driven = plan.protocol.bus.kind in {"master_slave", "link"} and not isinstance(frame.receiver, InStep)
+        self._askers = askers if driven else ()
+        self._slave = slave and driven and not any(each.both for each in askers)
+        self._nodes = nodes
+        self._echo = "auto" if frame.skips(_PROBE) else ""
+        self._name, self._codec = plan.protocol.name, file_stem(plan.protocol.name)
+
+    @cached_property
+    def names(self) -> Mapping[str, Sequence[str]]:
+        """Classes by module."""
+        found = {f"_{self._name}_aio": self._public("Async"), f"_{self._name}_bus": self._public("")}
+        return {module: names for module, names in found.items() if names}
+
+    def texts(self) -> Iterator[tuple[str, str]]:
+        """The modules and their texts."""
+        for module in self.names:
+            yield module, self._text("Async" if module.endswith("_aio") else "")
+
+    def _public(self, prefix: str) -> list[str]:
+        masters = (f"{prefix}{name}" for each in self._askers for name in (each.name, each.node) if name)
+        return sorted([*masters, *(["Slave"] if self._slave and not prefix else [])])
+
+    def _text(self, prefix: str) -> str:
+        slave = self._slave and not prefix
+        first, *others = banner(self._protocol)
+        what = "masters for asyncio" if prefix else "masters and slaves" if slave else "masters"
+        head = one_line(f"{first}: {what} that open a port.")
+        lines = [line for other in others for line in textwrap.wrap(one_line(other), WIDTH)]
+        doc = python_text.docstring([*textwrap.wrap(head, WIDTH - 4), "", *lines])
+        return (
+            templates()
+            .get_template("templates/ports.j2")
+            .render(
+                doc=doc,
+                imports=list(self._imports(prefix)),
+                public=self._public(prefix),
+                masters=[self._view(each, prefix) for each in self._askers],
+                codec=self._codec,
+                nodes=self._nodes,
+                prefix=prefix,
+                slave=slave,
+            )
+        )
+
+    def _view(self, asker: Asker, prefix: str) -> _View:
+        what = "One side of the link" if asker.both else "The bus" if asker.node else "The device on a line"
+        whom = "tasks of one event loop" if prefix else "threads"
+        text = f"{what}, a method for each command, for any number of {whom}."
+        return _View(
+            name=prefix + asker.name,
+            base=f"{prefix}{'Link' if asker.both else 'Bus'}Base",
+            calls=prefix + asker.calls,
+            doc=python_text.docstring(textwrap.wrap(text, WIDTH - 12)),
+            node=asker.node and prefix + asker.node,
+            node_calls=prefix + asker.node_calls,
+            echo="" if asker.both else self._echo,
+        )
+
+    def _imports(self, prefix: str) -> Iterator[str]:
+        module = "aio" if prefix else "blocking"
+        used = {"Link" if each.both else "Bus" for each in self._askers}
+        used |= {"Node" for each in self._askers if each.node}
+        for name in sorted(used):
+            yield f"from qlinkgen.bus.{module} import {prefix}{name} as {prefix}{name}Base"
+        if self._slave and not prefix:
+            yield "from qlinkgen.bus.slaves import Slave as SlaveBase"
+        yield ""
+        yield f"from . import {self._codec}"
+        calls = {
+            prefix + name
+            for each in self._askers
+            for name in (each.calls, each.node and each.node_calls)
+            if name
+        }
+        if calls:
+            line = f"from .{self._name}_bus import {', '.join(sorted(calls))}"
+            if len(line) <= WIDTH:
+                yield line
+            else:
+                yield f"from .{self._name}_bus import ("
+                yield from (f"    {each}," for each in sorted(calls))
+                yield ")"
