@@ -1,36 +1,32 @@
-"""The blocking client of a Q.link bus."""
+"""The client of a Q.link bus.
+
+Derived from `aio.py` by `python -m tests.unasync`: change that one, and run it.
+"""
 
 from __future__ import annotations
 
-import threading
-from collections import defaultdict
 from collections.abc import Callable, Generator, Iterable, Mapping
 from os import PathLike
-from typing import TypeVar, Unpack
+from typing import Self, Unpack
 
-from qlinkgen.codecs import qlink
-from qlinkgen.codecs.qlink_bus import MasterCalls, NodeCalls
-from qlinkgen.link.echo import EchoMode
-from qlinkgen.link.events import Event
-from qlinkgen.link.health import HealthPolicy
-from qlinkgen.link.master import MasterEngine
+from qlinkgen.bus.making import open_line
+from qlinkgen.bus.options import BusOptions, Parity
+from qlinkgen.codecs import qlink, qlink_bus
 from qlinkgen.link.procedure import FAILURES
 from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.protocols.qlink import survey
-from qlinkgen.protocols.qlink.bus_state import BusState, make_engine
-from qlinkgen.protocols.qlink.facts import BAUD, BROADCAST, NODES, PIECE
+from qlinkgen.protocols.qlink.bus_state import BusState
+from qlinkgen.protocols.qlink.facts import BROADCAST, NODES, PIECE
 from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport
+from qlinkgen.protocols.qlink.matching import ACCEPTS
 from qlinkgen.protocols.qlink.motion import MotionProgress, MotionState, Repeats, move, unanswered
-from qlinkgen.protocols.qlink.options import BusOptions
+from qlinkgen.protocols.qlink.options import QlinkOptions
 from qlinkgen.protocols.qlink.pacing import SyncReport, SyncTick
-from qlinkgen.transport.blocking import BlockingMaster
-from qlinkgen.transport.opening import closing_on_error, open_port
+from qlinkgen.transport.opening import closing_on_error
 from qlinkgen.transport.port import Port
 
-R = TypeVar("R", bound=qlink.Message)
 
-
-class Bus(BlockingMaster, MasterCalls):
+class Bus(qlink_bus.Bus):
     """A Q.link bus, for any number of threads.
 
     Every command of the document is a method with the node as its first argument, and a method of `node(n)`
@@ -42,54 +38,47 @@ class Bus(BlockingMaster, MasterCalls):
         ...     bus.node(3).motor_position().position
     """
 
-    engine: MasterEngine
+    accepts = ACCEPTS
 
     def __init__(
         self,
         port: Port,
         *,
-        attempts: int = 3,
-        echo: EchoMode = "auto",
-        health: HealthPolicy | None = HealthPolicy(),  # noqa: B008  # immutable
-        slack: float | None = None,
         crc: str | None = None,
         repeats: Repeats = "answered",
-        on_event: Callable[[Event], None] | None = None,
+        **options: Unpack[BusOptions],
     ) -> None:
         """Take ownership of a port; closing the bus closes it.
 
         Args:
             port: the port of the bus.
-            attempts: most transmissions of a request, the first included.
-            echo: whether the adapter echoes sent bytes: `expect`, `none`, or `auto` to probe with two zero
-                bytes before the first request.
-            health: when a silent node is offline; None: never.
-            slack: largest delay in seconds that driver, adapter and operating system add to a transaction; by
-                default derived from the port.
             crc: 16-bit CRC of the catalogue in place of the schema's.
             repeats: whether nodes answer a motion that is sent again under its number (section 7.10 does not
                 say): `answered`, `silent`, or `auto` to find out with the first motion to each node.
-            on_event: called with each event, in the calling thread.
+            options: see `qlinkgen.bus.options`.
         """
-        engine = make_engine(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc)
-        super().__init__(engine, port, on_event=on_event)
         self.state = BusState(repeats)
-        self._moving: defaultdict[int, threading.Lock] = defaultdict(threading.Lock)
-
-    def after_fork(self) -> None:
-        """See `BlockingMaster.after_fork`."""
-        super().after_fork()
-        self._moving = defaultdict(threading.Lock)
+        self._begin(port, qlink if crc is None else qlink.Codec(crc), **options)
 
     @classmethod
-    def open(cls, name: str, *, baud: int | None = None, **options: Unpack[BusOptions]) -> Bus:
+    def open(
+        cls,
+        name: str,
+        *,
+        baud: int | None = None,
+        parity: Parity = "none",
+        stop_bits: int = 1,
+        reopen: bool = False,
+        **options: Unpack[QlinkOptions],
+    ) -> Self:
         """Open a device name or a URL of pyserial, by default at 115200 baud; the rest as for the class.
 
         Raises:
             PortMissing: the port does not exist.
             PortBusy: another program uses it, or this user lacks the permission.
         """
-        with closing_on_error(open_port(name, baud=baud or BAUD)) as port:
+        opened = open_line(qlink, name, baud=baud, parity=parity, stop_bits=stop_bits, reopen=reopen)
+        with closing_on_error(opened) as port:
             return cls(port, **options)
 
     def transact(self, request: Question, *, attempts: int | None = None, trial: bool = False) -> Reply:
@@ -112,15 +101,6 @@ class Bus(BlockingMaster, MasterCalls):
         """Return one node, 1..16."""
         return Node(self, number)
 
-    def ask(self, request: qlink.Message, response: type[R]) -> R:  # noqa: ARG002  # for type checkers
-        """Send a request and return its answer."""
-        answer: R = self.transact(request).response
-        return answer
-
-    def tell(self, request: qlink.Message) -> None:
-        """Send a request without a response."""
-        self.transact(request)
-
     def motion(
         self, node: int, *, counter: int | None = None, outputs: int = 0, segments: list[int] | None = None
     ) -> qlink.MotionResponse:
@@ -138,10 +118,11 @@ class Bus(BlockingMaster, MasterCalls):
         """
         if counter is not None:
             return super().motion(node, counter=counter, outputs=outputs, segments=segments)
-        with self._moving[node]:
+        with self.transaction():
             request = qlink.MotionRequest(node=node, outputs=outputs, segments=segments)
             state = self.state.motions[node]
-            reply = self._quick(state, request) if state.ready else self.run(move(state, request))
+            moved = self._quick(state, request) if state.ready else self.run(move(state, request))
+            reply = moved
             answer: qlink.MotionResponse = reply.response
             return answer
 
@@ -158,7 +139,7 @@ class Bus(BlockingMaster, MasterCalls):
 
     def clear_fifo(self, node: int) -> qlink.ClearFifoResponse:
         """Drop all words queued in a node, and its pending motion (section 7.12)."""
-        with self._moving[node]:
+        with self.transaction():
             self.state.motions[node].drop()  # also without an answer: the node may have executed it
             response = super().clear_fifo(node)
             self.state.motions[node].forget()
@@ -166,7 +147,7 @@ class Bus(BlockingMaster, MasterCalls):
 
     def node_reset(self, node: int) -> qlink.NodeResetResponse:
         """Reset a node; it answers first (section 7.7). Its pending motion is dropped."""
-        with self._moving[node]:
+        with self.transaction():
             self.state.motions[node].drop()  # also without an answer: the node may have executed it
             response = super().node_reset(node)
             self.state.motions[node].forget()
@@ -258,7 +239,7 @@ class Bus(BlockingMaster, MasterCalls):
         return self.run(survey.status(nodes))
 
 
-class Node(NodeCalls):
+class Node(qlink_bus.Node):
     """One node of a bus: every command of the document without the node argument.
 
     Attributes:
@@ -266,19 +247,7 @@ class Node(NodeCalls):
         number: address of the node, 1..16.
     """
 
-    def __init__(self, bus: Bus, number: int) -> None:
-        if number not in NODES:
-            raise ValueError(f"node must be 1..16, not {number}")
-        self.bus = bus
-        self.number = number
-
-    def ask(self, request: qlink.Message, response: type[R]) -> R:
-        """Send a request and return its answer."""
-        return self.bus.ask(request, response)
-
-    def tell(self, request: qlink.Message) -> None:
-        """Send a request without a response."""
-        self.bus.tell(request)
+    bus: Bus
 
     def motion(
         self, *, counter: int | None = None, outputs: int = 0, segments: list[int] | None = None

@@ -13,39 +13,18 @@ from typing import get_args
 
 from qlinkgen.codecs import qlink
 from qlinkgen.errors import CommandError
-from qlinkgen.link.codec import Codec, Message
-from qlinkgen.link.echo import EchoMode
-from qlinkgen.link.health import HealthPolicy
-from qlinkgen.link.master import MasterEngine
+from qlinkgen.link.codec import Message
 from qlinkgen.link.procedure import Procedure
 from qlinkgen.link.transaction import Question
 from qlinkgen.protocols.qlink import loading, motion, pacing
 from qlinkgen.protocols.qlink.arguments import known, positive, whole
 from qlinkgen.protocols.qlink.facts import BROADCAST, SYNCS
 from qlinkgen.protocols.qlink.hexfile import read_hex
-from qlinkgen.protocols.qlink.matching import ACCEPTS
-from qlinkgen.transport.conversation import timing_of
-from qlinkgen.transport.port import Port
 
 #: Requests after which a motor may have stopped, so that its last status is outdated.
 _STOPPING = (qlink.NodeStopRequest, qlink.ClearFifoRequest, qlink.NodeResetRequest)
 #: Syncs of one run: more than a bus can send in its life.
 MOST_SYNCS = 1 << 62
-
-
-def make_engine(
-    port: Port,
-    *,
-    attempts: int,
-    echo: EchoMode,
-    health: HealthPolicy | None,
-    slack: float | None,
-    crc: str | None,
-) -> MasterEngine:
-    """Return the engine of a Q.link master on a port."""
-    codec: Codec = qlink if crc is None else qlink.Codec(crc)
-    timing = timing_of(codec, port, slack=slack, attempts=attempts)
-    return MasterEngine(codec, timing, echo=echo, health=health, accepts=ACCEPTS)
 
 
 class BusState:
