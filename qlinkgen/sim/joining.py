@@ -1,0 +1,104 @@
+"""Joins a master with simulated slaves, on a virtual clock or over a pty."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Generic, Literal, TypeVar
+
+from qlinkgen.bus import aio, blocking
+from qlinkgen.bus.making import make_peer
+from qlinkgen.link.codec import Codec
+from qlinkgen.link.peer import PeerEngine
+from qlinkgen.link.slave import Node, SlaveEngine
+from qlinkgen.sim.faults import FaultPlan
+from qlinkgen.sim.generic import GenericNode
+from qlinkgen.sim.virtual import VirtualPort
+from qlinkgen.sim.wire import Wire
+from qlinkgen.transport.opening import open_port
+from qlinkgen.transport.port import Port
+
+#: Speed of a line in bits per second, if the schema states none.
+USUAL_SPEED = 115200
+
+Transport = Literal["virtual", "pty"]
+M = TypeVar("M", bound="blocking.Calls | aio.AsyncCalls")
+
+
+@dataclass(frozen=True, slots=True)
+class Joined(Generic[M]):
+    """A master, and the line to its slaves.
+
+    Attributes:
+        master: the master, or one side of a link.
+        others: the engines of the slaves, or of the other side.
+        wire: the line, with its faults and taps.
+    """
+
+    master: M
+    others: tuple[SlaveEngine | PeerEngine, ...]
+    wire: Wire
+
+
+@contextlib.contextmanager
+def join(
+    master: type[M],
+    *handlers: Node,
+    transport: Transport = "virtual",
+    faults: FaultPlan | None = None,
+    turnaround: float = 0.0,
+    own: Node | None = None,
+    **options: Any,  # of the class, which checks them
+) -> Iterator[Joined[M]]:
+    """Join a class of a generated bus module with slaves during a block, and close it afterwards.
+
+    Args:
+        master: the class, such as `oven_bus.Bus`.
+        handlers: the slaves; by default one that answers each command with the defaults of its response. On a
+            link whose sides both ask, the other side.
+        transport: "virtual": time passes only while the master waits; "pty": a pseudo-terminal, in real time.
+        faults: what happens to frames on the line.
+        turnaround: seconds from a request to its answer.
+        own: handlers of this side, where both sides of a link ask.
+        options: options of the class, such as `attempts`.
+    """
+    codec = master.codec
+    speed = codec.BUS.baud or USUAL_SPEED
+    paced = transport == "virtual"
+    wire = Wire(baud=speed if paced else None, bits_per_byte=codec.BUS.bits_per_byte, faults=faults)
+    nodes = handlers or (_usual(codec),)
+    both = issubclass(master, blocking.Link | aio.AsyncLink)
+    with contextlib.ExitStack() as stack:
+        port = stack.enter_context(_port(wire, transport, speed))
+        others = tuple(_engine(codec, port, each, turnaround, both=both) for each in nodes)
+        for engine in others:
+            wire.attach(engine)
+        given = (own or _usual(codec),) if both else ()
+        make: Any = master  # its arguments depend on the kind
+        made: M = make(port, *given, **options)
+        stack.callback(made.close)
+        yield Joined(made, others, wire)
+
+
+def _usual(codec: Codec) -> GenericNode:
+    return GenericNode(codec, codec.BUS.first_node or 0)
+
+
+def _engine(
+    codec: Codec, port: Port, handlers: Node, turnaround: float, *, both: bool
+) -> SlaveEngine | PeerEngine:
+    if both:
+        return make_peer(codec, port, handlers, turnaround=turnaround)
+    return SlaveEngine(codec, handlers, turnaround=turnaround, baud=port.baud)
+
+
+@contextlib.contextmanager
+def _port(wire: Wire, transport: Transport, speed: int) -> Iterator[Port]:
+    if transport == "virtual":
+        yield VirtualPort(wire, baud=speed)
+        return
+    from qlinkgen.sim.pty_bus import PtyBus  # noqa: PLC0415  # needs a system that has ptys
+
+    with PtyBus(wire) as line, open_port(line.path, baud=speed) as port:
+        yield port
