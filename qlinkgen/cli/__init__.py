@@ -26,6 +26,7 @@ COMMANDS = {
     "simulate": "Simulate nodes, a ring or a chip set on a new port, with optional faults.",
     "scan": "Find the nodes of a bus.",
     "send": "Send one request on a port and print its response, or one message into a ring.",
+    "fuzz": "Send valid, wrong and damaged frames to a device, and report what it does wrong.",
     "load": "Load an Intel HEX file into a Q.link node.",
     "monitor": "Listen to a bus or a fibre: requests, responses, repeats, late and damaged frames.",
     "ring": "Join a Trio ring as a passive node: forward and print every message.",

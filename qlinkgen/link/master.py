@@ -177,6 +177,11 @@ class MasterEngine:
         return self._state is not IDLE
 
     @property
+    def echoes(self) -> bool:
+        """Whether sent bytes are received too, as far as known."""
+        return self._echo.mode == "expect"
+
+    @property
     def line(self) -> QuietLine:
         """What it knows about the line."""
         return self._line
