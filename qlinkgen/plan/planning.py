@@ -80,9 +80,7 @@ class _Planner:
         if any(field.conditional or field.terminated or field.walked for field in self._all):
             return self.walked()
         front, steps = Size(), []
-        for index, field in enumerate(self._all):
-            rest = self._all[index:]
-            back = sum(each.max_size for each in rest) if all(each.fixed for each in rest) else None
+        for field, back in zip(self._all, self._backs(), strict=True):
             steps.append(self._step(field, Place(front, back)))
             end = front + field.max_size if field.fixed else front.plus(_term(field.name, field.type))
             self._spans[field.name] = (front, end)
@@ -95,6 +93,15 @@ class _Planner:
             most=sum(field.max_size for field in self._all),
             empty_is_default=empty_is_default,
         )
+
+    def _backs(self) -> list[int | None]:
+        """The distance of each field from the end, None where the size of what follows varies."""
+        found: list[int | None] = []
+        left: int | None = 0
+        for field in reversed(self._all):
+            left = left + field.max_size if left is not None and field.fixed else None
+            found.append(left)
+        return found[::-1]
 
     def separated(self, message: Message) -> PayloadPlan:
         """Texts between separators."""

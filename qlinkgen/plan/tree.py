@@ -18,6 +18,8 @@ from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.payload import Member, PayloadPlan
 from qlinkgen.plan.select import Role
 
+_DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
+
 
 def shortest(frames: Sequence[FramePlan], size: int) -> FramePlan:
     """The first kind of frame with room for a payload of a size, else the last."""
@@ -177,8 +179,15 @@ class Plan:
 
     def received(self, direction: Direction) -> tuple[MessagePlan, ...]:
         """Messages that a decoder for a direction accepts, those that both sides send included."""
-        given = (each for each in self.messages if each.direction in (direction, "message"))
-        return tuple(each for each in given if not each.asked and not each.turned)
+        return self._received[direction]
+
+    @cached_property
+    def _received(self) -> Mapping[Direction, tuple[MessagePlan, ...]]:
+        told = [each for each in self.messages if not each.asked and not each.turned]
+        return {
+            direction: tuple(each for each in told if each.direction in (direction, "message"))
+            for direction in _DIRECTIONS
+        }
 
     @property
     def turned(self) -> tuple[MessagePlan, ...]:
@@ -227,8 +236,7 @@ class Plan:
     @cached_property
     def _known(self) -> Mapping[Direction, Mapping[int, MessagePlan]]:
         # Decoders look each frame up in it.
-        directions: tuple[Direction, ...] = get_args(Direction)
-        return {each: {message.id: message for message in self.received(each)} for each in directions}
+        return {each: {message.id: message for message in self.received(each)} for each in _DIRECTIONS}
 
     def direction_of(self, message: MessagePlan) -> Direction:
         """The direction that a decoder of the message has to be set to."""

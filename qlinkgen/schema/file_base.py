@@ -21,6 +21,10 @@ class FileMapping(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 
 
+#: Types of most attributes.
+_SINGLE = frozenset({type(None), bool, int, str})
+
+
 def nested(node: BaseModel) -> Iterator[tuple[str, str, object]]:
     """The attributes of a mapping that hold mappings or lists: name, key in the file, value.
 
@@ -28,7 +32,7 @@ def nested(node: BaseModel) -> Iterator[tuple[str, str, object]]:
     """
     fields = type(node).model_fields
     for name, value in node.__dict__.items():
-        if isinstance(value, BaseModel | dict | list):
+        if type(value) not in _SINGLE and isinstance(value, BaseModel | dict | list):
             yield name, fields[name].alias or name, value
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import address_member, snake, stem
 from qlinkgen.model.protocol import Protocol
@@ -11,6 +13,7 @@ from qlinkgen.model.types import Characters, Enum, Flags, Scalar
 _WIDTHS = (8, 16, 32, 64, 128)
 
 
+@cache
 def storage(bits: int) -> int:
     """Bits of the smallest C integer with at least ``bits`` bits."""
     return next(width for width in _WIDTHS if width >= bits)
