@@ -34,9 +34,10 @@ class Location:
 
     def reject(self, spec: BaseModel, keys: Iterable[str], what: str, hint: str = "remove it") -> None:
         """Report the given keys that do not apply to ``what``."""
-        attributes = {field.alias or name: name for name, field in type(spec).model_fields.items()}
+        fields = type(spec).model_fields
+        given = {fields[name].alias or name: getattr(spec, name) for name in spec.model_fields_set}
         for key in keys:
-            if getattr(spec, attributes[key]) not in (None, False, ""):
+            if given.get(key) not in (None, False, ""):
                 self.key_fault("not-applicable", key, f"'{key}' has no effect on {what}", hint)
 
     def inner(self, *keys: str, written: Iterable[str] = ()) -> Location:
