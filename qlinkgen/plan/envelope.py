@@ -66,7 +66,8 @@ class Envelope:
 
     def absent(self, part: Part, cells: Mapping[str, bytes]) -> bool:
         """Whether a frame with these parts in its header does not have a part."""
-        return any(part in each.parts and not each.holds(cells) for each in self.conditional)
+        conditional = self.conditional
+        return bool(conditional) and any(part in each.parts and not each.holds(cells) for each in conditional)
 
     @property
     def least_overhead(self) -> int:
@@ -203,7 +204,11 @@ class Envelope:
 
     def identifies(self, part: Part) -> bool:
         """Whether the part holds bits of the message number or the address."""
-        return any(bits.part is part for bits in (*self.id, *self.address))
+        return id(part) in self._identifying
+
+    @cached_property
+    def _identifying(self) -> frozenset[int]:
+        return frozenset(id(bits.part) for bits in (*self.id, *self.address))
 
     def offset(self, wanted: Part) -> int:
         """Offset of a part; the payload counts as empty."""

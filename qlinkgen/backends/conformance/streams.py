@@ -71,8 +71,10 @@ def stream(plan: Plan, message: MessagePlan, rows: Sequence[Row]) -> Stream | No
     unframed = message.asked or message.turned
     if not message.decoded or unframed or (plan.frame.needs_request and message.direction == "response"):
         return None
-    for noisy, everything in ((True, True), (False, True), (False, False)):
-        found = _heard(plan, plan.direction_of(message), rows, noisy=noisy, everything=everything)
+    direction, right = plan.direction_of(message), [isinstance(row, Right) for row in rows]
+    kept = [right[index] or fed(plan, direction, row.wire) for index, row in enumerate(rows)]
+    for noisy, chosen in ((True, kept), (False, kept), (False, right)):
+        found = _heard(plan, direction, rows, chosen, noisy=noisy)
         if found is not None:
             return Stream(noisy, found)
     return None
@@ -87,13 +89,13 @@ def fed(plan: Plan, direction: Direction, wire: bytes) -> bool:
 
 
 def _heard(
-    plan: Plan, direction: Direction, rows: Sequence[Row], *, noisy: bool, everything: bool
+    plan: Plan, direction: Direction, rows: Sequence[Row], chosen: Sequence[bool], *, noisy: bool
 ) -> tuple[tuple[str, ...] | None, ...] | None:
     listener, pieces = receiver(plan, direction), noise(plan)
     events: list[tuple[str, ...] | None] = []
     intact: list[Decoded] = []
     for index, row in enumerate(rows):
-        if not isinstance(row, Right) and not (everything and fed(plan, direction, row.wire)):
+        if not chosen[index]:
             events.append(None)
             continue
         data = (pieces[index % len(pieces)] if noisy else b"") + row.wire
