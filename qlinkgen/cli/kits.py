@@ -16,6 +16,11 @@ from qlinkgen.model.protocol import Protocol
 def generate(protocol: Protocol, options: Options) -> Outputs:
     """Generate the kit of a protocol."""
     (text,) = vectors.generate(protocol, options).values()
+    return of_vectors(protocol, options, text)
+
+
+def of_vectors(protocol: Protocol, options: Options, text: str) -> Outputs:
+    """Generate the kit of a protocol whose vectors have been generated."""
     sources = Sources(interface(protocol), json.loads(text, parse_float=Decimal), by_hand(protocol))
     return conformance.generate(protocol, options, sources)
 

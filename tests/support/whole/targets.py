@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import sys
 import types
@@ -9,8 +10,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Context, Decimal
 from fractions import Fraction
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 from construct import ConstructError, RangeError
 
@@ -420,12 +423,25 @@ def _printed(package: Path, outputs: Outputs) -> types.ModuleType:
     sys.path.insert(0, str(package.parent))
     importlib.invalidate_caches()
     try:
-        modules = [importlib.import_module(f"{package.name}.{name}") for name in names]
+        with mock.patch.object(SourceFileLoader, "get_code", _code):
+            modules = [importlib.import_module(f"{package.name}.{name}") for name in names]
         return modules[0]
     finally:
         sys.path.remove(str(package.parent))
         for each in [each for each in sys.modules if each.split(".")[0] == package.name]:
             del sys.modules[each]
+
+
+@functools.lru_cache(maxsize=200)
+def compiled(source: bytes, name: str) -> types.CodeType:
+    """The code of a module; most support modules are the same for many schemas."""
+    return compile(source, name, "exec")
+
+
+def _code(loader: SourceFileLoader, module: str) -> types.CodeType:
+    """The code of an imported module."""
+    path = Path(loader.get_filename(module))
+    return compiled(path.read_bytes(), path.name)
 
 
 class CTarget(Target):
