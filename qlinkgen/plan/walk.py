@@ -389,7 +389,21 @@ def _measured_segment(segment: Segment, walk: Walk, start: bytes, at: int) -> in
             if len(start) < end:
                 raise Missing(end)
             walk.learn(step, start[begin:end], begin)
+    if segment.terminator:
+        return at + _sought(segment, start, at)
     return at + walk.size(segment, at, 1 << 32)
+
+
+def _sought(segment: Segment, start: bytes, at: int) -> int:
+    """The size of bytes with their terminator, which may be missing yet. Raises Missing or Wrong."""
+    run = segment.run
+    assert run is not None
+    count = start[at : at + run.length.maximum + 1].find(segment.terminator)
+    if count < 0 and len(start) <= at + run.length.maximum:
+        raise Missing(max(len(start), at) + 1)
+    if count < run.length.minimum:
+        raise Wrong(value_name(run), at, segment.steps)
+    return count + 1
 
 
 def _measured_records(segment: Segment, step: Walkable, walk: Walk, start: bytes, at: int) -> int:

@@ -100,28 +100,34 @@ def build_blob(spec: FieldSpec, text: TypeText, payload_max: int, location: Loca
 def _terminated(
     spec: FieldSpec, terminator: bytes, text: TypeText, length: Length, location: Location
 ) -> Blob:
-    """Text of variable size that a character ends."""
+    """Bytes or text of variable size that a byte ends."""
+    whole = text.base == "text"
 
     def wrong(what: str, hint: str) -> None:
         location.key_fault("bad-terminated", "terminator", what, hint)
 
-    if text.base != "text":
-        wrong("bytes may contain every byte", "use text, or give the bytes a count")
-    elif spec.pad is not None:
-        wrong("a text is padded or terminated", "remove one of both")
+    if spec.pad is not None:
+        wrong(f"{'a text is' if whole else 'bytes are'} padded or terminated", "remove one of both")
     elif not (text.count or "").strip():
-        wrong("the text has no greatest size", "write one, like text[0..16]")
+        wrong(
+            f"the {text.base} {'has' if whole else 'have'} no greatest size",
+            f"write one, like {text.base}[0..16]",
+        )
     elif length.fixed:
-        wrong("a text of constant size has no end of its own", f"write text[0..{length.maximum}], or pad")
-    if len(terminator) != 1 or terminator > b"\x7f":
+        what = f"{text.base} of constant size has no end of its own"
+        wrong(what, f"write {text.base}[0..{length.maximum}], or pad")
+    if whole and (len(terminator) != 1 or terminator > b"\x7f"):
         wrong("the terminator is not one 7-bit character", "write one, like 00 or 0D")
+    elif len(terminator) != 1:
+        wrong("the terminator is not one byte", "write one, like 00")
     default = _blob_default(spec, text, length, location)
     if terminator in default:
         wrong("the default contains the terminator", "use other characters")
-    fill = b" " if terminator != b" " else b"_"
+    fills = (b" ", b"_") if whole else (b"\0", b"\1")
+    fill = fills[terminator == fills[0]]
     required = spec.default is None and length.minimum > 0
     return Blob(
-        True, length, default.ljust(length.minimum, fill), b"", terminator[:1], terminator[:1], required
+        whole, length, default.ljust(length.minimum, fill), b"", terminator[:1], terminator[:1], required
     )
 
 

@@ -123,7 +123,7 @@ class FieldSpec(Fact, Lifetime):
         description="Byte that fills up text or bytes of a constant size, or 20 before a decimal number",
     )
     terminator: ByteText | None = Field(
-        default=None, description="Character that follows a text of variable size; not part of the value"
+        default=None, description="Byte that follows text or bytes of variable size; not part of the value"
     )
     as_: str | None = Field(
         default=None,

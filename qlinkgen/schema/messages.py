@@ -366,7 +366,7 @@ class MessageBuilder:
             if turned and field.name in asked:
                 self._check_asked(message, field, asked, path)
                 continue
-            if (field.open or _has_terminator(field)) and not message.separator:
+            if field.open and not message.separator:
                 neither = f"neither the frame nor {message.name} has a length"
                 what = f"the end of {field.name} is unknown: {neither}"
                 hint = "give it a count or a fixed size, or give the frame a length or terminator"
@@ -443,13 +443,6 @@ class MessageBuilder:
             what = f"a byte of {field.name} can have the marker bit {marker:#04x}"
             hint = "send it in groups: {bits: 7, first: least}, or as text"
             self._error("marker-in-payload", (*path, field.name), what, hint)
-
-
-def _has_terminator(field: Field) -> bool:
-    """Whether a character ends it, or a text in its records."""
-    kind = field.type
-    inner = kind.layout.fields if isinstance(kind, Record | Records) else ()
-    return field.terminated or any(map(_has_terminator, inner))
 
 
 def _chunks(kind: Scalar | Bits | Array) -> tuple[Chunk, ...]:

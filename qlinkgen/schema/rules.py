@@ -188,7 +188,7 @@ _ALL = (
     ),
     Rule(
         "bad-terminated",
-        "A terminator is a character that follows a text of variable size, and does not occur in it.",
+        "A terminator is a byte that follows text or bytes of variable size, and does not occur in them.",
         "A receiver finds the end of the text by it, and needs room for the longest one.",
     ),
     Rule(

@@ -40,6 +40,34 @@ commands:
       rest: bytes
     response: {word: u8, name: {type: "text[1..20]", terminator: 00}}
 """
+#: The terminators tell the size of the frame.
+UNCOUNTED = """
+qlinkgen: 1
+protocol: {name: sought, title: Sought, revision: "1", source: Example, doc: Bytes with an end}
+byteorder: big
+types:
+  pair: {fields: {key: {type: "text[1..4]", terminator: "20"}, value: {type: "bytes[0..3]", terminator: FF}}}
+frame:
+  parts:
+    start: AA 55
+    code: {role: message, type: u8}
+    data: {role: payload, size: 0..80}
+    sum: {type: u8, algorithm: sum8, over: [code, data]}
+bus: {kind: master_slave}
+defaults: {addressing: none, repeat: safe}
+commands:
+  describe:
+    id: 1
+    request:
+      kind: u8
+      key: {type: "bytes[2..5]", terminator: 7E}
+      place: {type: "text[1..3]", terminator: 00, if: {kind: 1}}
+      number: u16
+    response:
+      count: {type: u8, counts: pairs}
+      pairs: "pair[0..3]"
+      name: {type: "text[1..20]", terminator: 00}
+"""
 VALUES: dict[str, Raw] = {
     "kind": 1, "maker": b"hi", "name": b"abc", "place": b"", "number": 3, "rest": b"zz",
 }  # fmt: skip
@@ -94,5 +122,23 @@ def test_a_text_does_not_contain_its_end(name: str, value: str) -> None:
     assert caught.value.field == name
 
 
-def test_all_outputs_agree() -> None:
-    assert run_text(SCHEMA).differences == []
+@pytest.mark.parametrize("text", [SCHEMA, UNCOUNTED], ids=["length", "no length"])
+def test_all_outputs_agree(text: str) -> None:
+    assert run_text(text).differences == []
+
+
+def test_a_frame_ends_where_its_terminators_tell() -> None:
+    found, wrong = loads(UNCOUNTED, "sought.yaml")
+    assert found is not None, wrong
+    codec = python.load(found)
+    one = codec.DescribeRequest(kind=1, key=b"\xaa\x55", place="ab", number=7)
+    two = codec.DescribeRequest(kind=0, key=b"\0\1\2", place=None, number=0x7E)
+    decoder, stream = codec.StreamDecoder("request"), one.to_frame() + two.to_frame()
+    assert [each for byte in stream for each in decoder.feed(bytes((byte,)))] == [one, two]
+    cut = one.to_frame().replace(b"\x7e", b"\x7d")  # without its end, the key is too long
+    faults = codec.StreamDecoder("request").feed(cut + two.to_frame())
+    assert faults[0].kind == "length"
+    assert faults[-1] == two
+    with pytest.raises(codec.EncodeError) as caught:
+        codec.DescribeRequest(key=b"a\x7eb").to_bytes()
+    assert caught.value.field == "key"

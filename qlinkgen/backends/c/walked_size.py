@@ -20,6 +20,7 @@ from qlinkgen.plan.payload import (
     PayloadPlan,
     RecordsStep,
     RecordStep,
+    RunStep,
     Segment,
     Step,
     ValueStep,
@@ -73,6 +74,7 @@ class _Sizer:
         ]
         counts = (step for step in self._steps if isinstance(step, CountStep))
         found = dict.fromkeys(f"{step.run}_{'bytes' if step.sized else 'count'}" for step in counts)
+        found |= {f"{each.run.name}_count": None for each in self._segments if each.run and each.terminator}
         return [*lines, *(f"size_t {name} = 0U;" for name in found)]
 
     def _walk(self) -> list[str]:
@@ -93,19 +95,42 @@ class _Sizer:
             self._decided(step)
         if segment.records is not None:
             learner.lines += self._records(segment.records, present=segment.presence is None)
-        else:
-            size = f"{segment.size}U"
-            if run is not None:
-                count = f"{run.name}_count"
-                size = f"{run.item_size}U * {count}" if run.item_size > 1 else count
-            least = run.item_size * run.length.minimum if run is not None and segment.presence is None else 0
-            if run is not None:
-                learner.lines.append(f"*size += {size}{f' - {least}U' if least else ''};")
+        elif run is not None and segment.terminator:
+            learner.lines += self._sought(run, segment)
+        elif run is not None:
+            count = f"{run.name}_count"
+            size = f"{run.item_size}U * {count}" if run.item_size > 1 else count
+            least = run.item_size * run.length.minimum if segment.presence is None else 0
+            learner.lines.append(f"*size += {size}{f' - {least}U' if least else ''};")
             learner.lines.append(f"at += {size};")
+        else:
+            learner.lines.append(f"at += {segment.size}U;")
         inner, learner.lines = learner.lines, []
         if segment.presence is None:
             return inner
         return ["if (" + self._condition(segment.presence.when) + ") {", *_indented(inner), "}"]
+
+    def _sought(self, run: RunStep, segment: Segment) -> list[str]:
+        """Statements that look for the terminator of bytes, all of which is needed until it is there."""
+        upper, count = self._learner.layouts.prefix.upper(), f"{run.name}_count"
+        least, most = run.length.minimum, run.length.maximum
+        end = unsigned(segment.terminator[0], 8, hexadecimal=True)
+        short = [f"{count} < {least}U"] if least else []
+        left = f"((at + {count}) < available) && ({count} <= {most}U)"
+        return [
+            *([f"*size += {least + 1}U;"] if segment.presence else []),
+            f"while ({left} && (payload[at + {count}] != {end})) {{",
+            f"    ++{count};",
+            "}",
+            *refusal([f"{count} > {most}U"], f"{upper}_ERROR_LENGTH"),
+            f"if ((at + {count}) == available) {{",
+            "    *size = (*size > available) ? *size : (available + 1U);",
+            f"    return {upper}_ERROR_TRUNCATED;",
+            "}",
+            *(refusal(short, f"{upper}_ERROR_LENGTH") if short else []),
+            f"*size += {count}{f' - {least}U' if least else ''};",
+            f"at += {count} + 1U;",
+        ]
 
     def _condition(self, tests: Sequence[Test]) -> str:
         return condition(tests, self._numbers, lambda name: f"{name}_raw")

@@ -45,7 +45,7 @@ _SUPPORT = {
     "_kinds": "Kind Kinds Turned",
     "_fended": "EndedKind",
     "_ftrimmed": "Trimmed",
-    "_fwalks": "TerminatedText Walked",
+    "_fwalks": "TerminatedBytes TerminatedText Walked",
     "_fvaried": "One Several SizeOf Varied VariedRecord",
 }
 #: Copied only if a tree uses them.

@@ -18,7 +18,7 @@ from construct import (
 )
 
 from ._fields import BitFields, Count, Values
-from ._fwalks import Presence, Test, Walked, _values
+from ._fwalks import Presence, Taken, Test, Walked, _values
 
 
 class SizeOf(Count):
@@ -257,13 +257,13 @@ class Varied(Walked):
 
     def measured(self, take: Callable[[int], bytes]) -> bytes:
         """Read a payload with ``take``; its size follows from counts and tested values."""
-        taken = _Taken(take)
+        taken = Taken(take)
         at, _ = self.extent(taken, 0)
         if at > self.most:
             raise RangeError(f"{at} bytes are too many for {self.name}")
         return taken.upto(at)
 
-    def extent(self, taken: _Taken, at: int) -> tuple[int, Mapping[str, int]]:
+    def extent(self, taken: Taken, at: int) -> tuple[int, Mapping[str, int]]:
         """The offset of the end of what begins at an offset, and the raw numbers that tests need."""
         counts, numbers, sizes = dict(self.known), dict[str, int](), dict[str, int]()
         for segment in self._segments():
@@ -282,6 +282,7 @@ class Varied(Walked):
                 )
                 continue
             for field in segment:
+                self._seek(field, taken, at, counts)
                 size = self._size(field, counts)
                 if self._decides(field, counts, sizes):
                     cell = taken.upto(at + size)[at:]
@@ -381,20 +382,6 @@ def _check_filled(name: str, at: int, limit: int, path: str) -> None:
         raise RangeError(f"{name} does not fill its bytes", path=path)
 
 
-class _Taken:
-    """The beginning of a payload, as far as it has been read."""
-
-    def __init__(self, take: Callable[[int], bytes]) -> None:
-        self._take = take
-        self._data = b""
-
-    def upto(self, end: int) -> bytes:
-        """The bytes up to an offset."""
-        if end > len(self._data):
-            self._data += self._take(end - len(self._data))
-        return self._data[:end]
-
-
 def several_at(
     several: Several, data: bytes, at: int, end: int, number: int | None
 ) -> tuple[Container | list[Container], int]:
@@ -418,7 +405,7 @@ def several_at(
     return found, at
 
 
-def extent_of(several: Several, taken: _Taken, at: int, number: int) -> int:
+def extent_of(several: Several, taken: Taken, at: int, number: int) -> int:
     """The offset of the end of records at an offset."""
     for _ in range(number):
         at, numbers = several.record.extent(taken, at)

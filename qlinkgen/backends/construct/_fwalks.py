@@ -20,6 +20,7 @@ from construct import (
 from ._fields import (
     BitFields,
     Bits,
+    BytesField,
     Count,
     Groups,
     Message,
@@ -36,27 +37,56 @@ Test = tuple[str, Sequence[tuple[int, int]], bool]
 Presence = tuple[str, Sequence[Test], bool]
 
 
-class TerminatedText(TextField):
-    """Text of 7-bit characters that one more ends, which it does not contain."""
+class TerminatedBytes(BytesField):
+    """Bytes that one more ends, which they do not contain."""
 
     def __init__(self, terminator: bytes, minimum: int, maximum: int) -> None:
         super().__init__(minimum, maximum)
         self.terminator = terminator
 
     def extent(self, number: int) -> int:
-        """Size of so many characters with their terminator."""
+        """Size of so many bytes with their terminator."""
         return number + 1
+
+    def sought(self, upto: Callable[[int], bytes], at: int) -> int:
+        """Their number; they begin at an offset of what ``upto`` reads up to another."""
+        for number in range(self.maximum + 1):
+            if upto(at + number + 1)[at + number :] == self.terminator:
+                return self.checked(number, "")
+        return self.checked(self.maximum + 1, "")
+
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> bytes | str:
+        data: bytes = stream_read_entire(stream, path)
+        return data[:-1]
+
+    def _build(self, obj: Row, stream: BinaryIO, context: Container, path: str) -> Row:
+        super()._build(obj, stream, context, path)
+        if self.terminator[0] in obj:
+            raise ValidationError(f"{obj!r} has its terminator in it", path=path)
+        stream_write(stream, self.terminator, 1, path)
+        return obj
+
+
+class TerminatedText(TextField, TerminatedBytes):
+    """Text of 7-bit characters that one more ends, which it does not contain."""
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> str:
         data: bytes = stream_read_entire(stream, path)
         return super()._parse(BytesIO(data[:-1]), context, path)
 
-    def _build(self, obj: Row, stream: BinaryIO, context: Container, path: str) -> Row:
-        super()._build(obj, stream, context, path)
-        if isinstance(obj, str) and self.terminator.decode() in obj:
-            raise ValidationError(f"{obj!r} has its terminator in it", path=path)
-        stream_write(stream, self.terminator, 1, path)
-        return obj
+
+class Taken:
+    """The beginning of a payload, as far as it has been read."""
+
+    def __init__(self, take: Callable[[int], bytes]) -> None:
+        self._take = take
+        self._data = b""
+
+    def upto(self, end: int) -> bytes:
+        """The bytes up to an offset."""
+        if end > len(self._data):
+            self._data += self._take(end - len(self._data))
+        return self._data[:end]
 
 
 class Walked(Message):
@@ -154,12 +184,13 @@ class Walked(Message):
 
     def measured(self, take: Callable[[int], bytes]) -> bytes:
         """Read a payload with ``take``; its size follows from counts and tested values."""
-        data, at = b"", 0
+        taken, at = Taken(take), 0
         counts, numbers = dict(self.known), dict[str, int]()
         for segment in self._segments():
             if not self._present(segment[0], numbers, 1):
                 continue
             for field in segment:
+                self._seek(field, taken, at, counts)
                 size = self._size(field, counts)
                 inner = (
                     field.subcon.fields
@@ -170,11 +201,19 @@ class Walked(Message):
                     isinstance(field.subcon, Count) and field.subcon.of not in counts
                 )
                 if counting or any(each.name in self.tested for each in inner):
-                    data += take(at + size - len(data))
-                    self._note(field, data[at : at + size], numbers)
-                    self._learn(field, data[at : at + size], counts, "")
+                    cell = taken.upto(at + size)[at:]
+                    self._note(field, cell, numbers)
+                    self._learn(field, cell, counts, "")
                 at += size
-        return data + take(at - len(data))
+        return taken.upto(at)
+
+    def _seek(
+        self, field: Renamed, taken: Taken, at: int, counts: dict[str, int]
+    ) -> None:
+        """Look for the end of bytes with a terminator, which begin at an offset."""
+        run = self.runs.get(field.name)
+        if isinstance(run, TerminatedBytes):
+            counts[field.name] = run.sought(taken.upto, at)
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
         data, at = stream_read_entire(stream, path), 0
@@ -225,7 +264,7 @@ class Walked(Message):
         run, left = self.runs.get(field.name), len(data)
         if run is None or field.name in counts:
             return
-        if isinstance(run, TerminatedText):
+        if isinstance(run, TerminatedBytes):
             counts[field.name] = run.checked(data.find(run.terminator), path)
             return
         number, odd = divmod(left - self._after(field, counts), run.size)

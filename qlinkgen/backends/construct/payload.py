@@ -297,7 +297,8 @@ class _Field:
     def _octets(self, step: BytesStep) -> Named:
         kind, default = ("TextField", step.default.decode()) if step.text else ("BytesField", step.default)
         if step.terminator:
-            return self._run(step, "TerminatedText", (step.terminator,), default)
+            kind = "TerminatedText" if step.text else "TerminatedBytes"
+            return self._run(step, kind, (step.terminator,), default)
         if step.excluded:
             text = Call("BetweenField", (step.length.minimum, step.length.maximum, step.excluded))
             return self._named(step, Call("Default", (text, default)))

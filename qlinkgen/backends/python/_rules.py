@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from struct import pack
 
-from ._support import Rule
+from ._support import BytesRule, Rule
 
 TYPE_CHECKING = False  # as typing.TYPE_CHECKING; importing `typing` costs 5 ms
 if TYPE_CHECKING:
@@ -76,3 +76,18 @@ class PaddedRule(Rule):
         """Whether the value is legal, and does not end with the byte."""
         data = value.encode() if isinstance(value, str) else bytes(value)
         return self.rule.allows(value) and not data.endswith(self.pad)
+
+
+class WithoutRule(BytesRule):
+    """Bytes without the one that ends them."""
+
+    __slots__ = ("excluded",)
+
+    def __init__(self, name: str, fewest: int, most: int, excluded: bytes) -> None:
+        super().__init__(name, fewest, most)
+        self.excluded = excluded
+        self.legal += f" without {excluded.hex()}"
+
+    def allows(self, value: Value) -> bool:
+        """Whether the value has a legal size, and not that byte."""
+        return super().allows(value) and not {*self.excluded} & {*bytes(value)}

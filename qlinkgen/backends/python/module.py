@@ -58,7 +58,7 @@ _SHARED: Mapping[str, Sequence[str]] = {
     "_proofs": ("Proof", "ProvenCommand"),
     "_reach": ("EachOf", "UntilStopped"),
     "_records": (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records"),
-    "_rules": ("FloatRule", "ListRule", "PaddedRule"),
+    "_rules": ("FloatRule", "ListRule", "PaddedRule", "WithoutRule"),
     "_rvaried": (
         *("EndedRule", "OpenRule", _VARIED_RECORD),
         *("read_counted", "read_ended", "read_filled", "read_one"),

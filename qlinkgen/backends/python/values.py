@@ -268,7 +268,8 @@ def _plain_rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Ca
 def _octets_rule(step: BytesStep, place: Place) -> Call:
     name, sizes = held(step), (step.least, step.length.maximum)
     if step.excluded:
-        return _rule(place, "BetweenRule", name, *sizes, literal(step.excluded))
+        kind = "BetweenRule" if step.text else "WithoutRule"
+        return _rule(place, kind, name, *sizes, literal(step.excluded))
     rule = _rule(place, "TextRule" if step.text else "BytesRule", name, *sizes)
     return Call(place.use("PaddedRule"), [rule.flat, literal(step.pad)]) if step.pad else rule
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from qlinkgen.backends.python import integers
 from qlinkgen.backends.python.decode import divided
-from qlinkgen.backends.python.layout import indented
+from qlinkgen.backends.python.layout import indented, literal
 from qlinkgen.backends.python.varied import condition
 from qlinkgen.model.condition import Test
 from qlinkgen.model.integer import Integer
@@ -77,6 +77,8 @@ class _Measure:
             return self._records(segment.records, present=segment.presence is None)
         decided = [line for step in segment.steps for line in self._decided(step)]
         run = segment.run
+        if run is not None and segment.terminator:
+            return self._sought(run, segment)
         if run is None:
             size = str(segment.size)
             # Known before its bytes are read, which a receiver of stuffed frames takes only as far as needed.
@@ -85,6 +87,22 @@ class _Measure:
         if segment.presence is None and run.length.minimum:
             more = f"{size} - {run.item_size * run.length.minimum}"
         return [*decided, f"size += {more}", f"start += {size}"]
+
+    def _sought(self, run: RunStep, segment: Segment) -> list[str]:
+        """The statements that look for the terminator of bytes, all of which is needed until it is there."""
+        least, most = run.length.minimum, run.length.maximum
+        return [
+            *([f"size += {least + 1}"] if segment.presence else []),
+            f"end = data.find({literal(segment.terminator)}, start, start + {most + 1})",
+            "if end < 0:",
+            f"    if len(data) > start + {most}:",
+            f"        return -(start + {most + 1})",
+            "    return max(size, len(data) + 1 - at)",
+            *([f"if end < start + {least}:", "    return -(end + 1)"] if least else []),
+            *(["read = end + 1"] if self._bounded else []),
+            f"size += end - start{f' - {least}' if least else ''}",
+            "start = end + 1",
+        ]
 
     def _records(self, step: RecordStep | RecordsStep, *, present: bool) -> list[str]:
         """The statements for walked records; some of them are in the minimum of what is ``present``."""

@@ -1201,7 +1201,12 @@ class FieldMaker:
             self._row(name, made, taken, room)
             return
         if rng.random() < 0.15 and self.shape.text and self.shape.has_length:
-            self._terminated(name, made, room)
+            self._terminated(rng, name, made, room)
+            return
+        # Drawn from another source: the schemas of earlier seeds stay what they are.
+        more = random.Random(f"terminated {rng.getstate()!r}")
+        if more.random() < 0.2 and self.shape.text and not self.shape.has_length and not self.shape.trimmed:
+            self._terminated(more, name, made, room)
             return
         kind, spec, step = self._variable_kind()
         most = min(rng.choice((1, 3, 8, 40, 250)), (room.left - room.least - self._counts_size) // step)
@@ -1225,9 +1230,8 @@ class FieldMaker:
         room.left -= most * step
         room.open_end = room.open_end and counted
 
-    def _terminated(self, name: str, made: list[tuple[str, Any]], room: Room) -> None:
-        """A text that a character ends, before a field that takes the rest."""
-        rng = self.rng
+    def _terminated(self, rng: random.Random, name: str, made: list[tuple[str, Any]], room: Room) -> None:
+        """A text that a character ends, or bytes, before a field that takes the rest."""
         most = min(rng.choice((1, 3, 8, 40)), room.left - room.least - 1)
         rows = any("packed" in spec and ".." in spec["type"] for _, spec in made if isinstance(spec, dict))
         if most < 1 or rows:
@@ -1236,6 +1240,10 @@ class FieldMaker:
         spec: Doc = {"type": f"text[{low}..{most}]", "terminator": rng.choice(("00", "0D", "20"))}
         if rng.random() < 0.3:
             spec["default"] = "a"
+        other = random.Random(f"bytes {rng.getstate()!r}")
+        if other.random() < 0.5 and not self.shape.groups:
+            spec = {"type": f"bytes[{low}..{most}]", "terminator": other.choice(("00", "FF", "7E"))}
+            spec |= {"default": "20"} if other.random() < 0.3 else {}
         opened = next((at for at, (_, each) in enumerate(made) if self._is_open(each, made)), len(made))
         made.insert(rng.randint(0, opened), (name, spec))
         room.left -= most + 1

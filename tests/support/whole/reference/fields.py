@@ -285,7 +285,7 @@ class Fields:
             return Run(item, base == "text", low, high, default, pad=octets(spec["pad"]))
         if "terminator" in spec:
             end = octets(spec["terminator"])
-            fill = ord("_") if end == b" " else fill
+            fill = ord("_") if end == b" " else 1 if end == b"\0" and base == "bytes" else fill
             return Run(item, base == "text", low, high, default + (fill,) * (low - len(default)), end=end)
         filled = default + (fill,) * (low - len(default))
         return Run(item, base == "text", low, high, filled, spec.get("packed", ""))

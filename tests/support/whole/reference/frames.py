@@ -864,6 +864,8 @@ class _Measure:
 
     def _plain(self, slot: Slot, at: int) -> int:
         kind = slot.kind
+        if isinstance(kind, Run) and kind.end:
+            return at + self._ended(kind, at)
         if isinstance(kind, Run | Records):
             return at + kind.bytes_of(self._counted.get(slot.name, kind.most))
         end = at + size_of(kind)
@@ -875,6 +877,15 @@ class _Measure:
         if slot.counts:
             self._count(slot, data)
         return end
+
+    def _ended(self, kind: Run, at: int) -> int:
+        """The size of a run with its terminator, byte by byte."""
+        for number in range(kind.most + 1):
+            if self._taker.upto(at + number + 1)[at + number :] == kind.end:
+                if number < kind.low:
+                    break
+                return number + 1
+        raise Wrong("length")
 
     def _count(self, slot: Slot, data: bytes) -> None:
         assert isinstance(slot.kind, Number)
