@@ -1,22 +1,19 @@
-"""Modbus over pseudo-terminals: our master with pymodbus's server, its client with our slave."""
+"""Modbus over pseudo-terminals: our bus with pymodbus's server, its client with our slave."""
 
 from __future__ import annotations
 
 import asyncio
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
 from qlinkgen.errors import Refused
-from qlinkgen.link import MasterEngine, Refusal, SlaveEngine
+from qlinkgen.link import Refusal
 from qlinkgen.transport import PtyPort, open_pty
-from qlinkgen.transport.blocking import BlockingMaster
-from qlinkgen.transport.conversation import timing_of
-from qlinkgen.transport.serving import serve
-from tests.library.protocols import described
+from tests.bus.wires import bus_of, codec_of
 
 pymodbus = pytest.importorskip("pymodbus", reason="needs pymodbus (pip install pymodbus)")
 
@@ -32,7 +29,7 @@ def framing(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture
 def codec(framing: str) -> Any:
-    return described(f"modbus_{framing}").module
+    return codec_of(f"modbus_{framing}")
 
 
 @pytest.fixture
@@ -74,86 +71,91 @@ def server(pty: PtyPort, framing: str) -> Iterator[None]:
 
 
 @pytest.fixture
-def master(pty: PtyPort, server: None, codec: Any) -> BlockingMaster:
-    return BlockingMaster(MasterEngine(codec, timing_of(codec, pty, slack=5.0)), pty)
+def node(pty: PtyPort, server: None, framing: str) -> Any:
+    return bus_of(f"modbus_{framing}").Bus(pty, slack=5.0, echo="none").node(NODE)
 
 
-def test_our_master_reads_and_writes(master: BlockingMaster, codec: Any) -> None:
-    ask: Callable[[Any], Any] = lambda request: master.transact(request).response  # noqa: E731
-    read = codec.ReadHoldingRegistersRequest(node=NODE, start=10, quantity=90)
-    assert ask(read).registers == REGISTERS[10:]
-    write = codec.WriteMultipleRegistersRequest(node=NODE, start=20, registers=[7, 8, 9])
-    assert ask(write).quantity == 3
-    assert ask(codec.WriteSingleRegisterRequest(node=NODE, number=11, value=0xFFFF)).value == 0xFFFF
-    assert ask(read).registers[:14] == [30, 0xFFFF, *REGISTERS[12:20], 7, 8, 9, REGISTERS[23]]
-    both = codec.ReadWriteMultipleRegistersRequest(
-        node=NODE, read_start=0, read_quantity=3, write_start=1, registers=[1]
-    )
-    assert ask(both).registers == [0, 1, REGISTERS[2]]
-    assert master.engine.total.requests == master.engine.total.answers == 5
+def test_our_bus_reads_and_writes(node: Any) -> None:
+    assert node.read_holding_registers(start=10, quantity=90).registers == REGISTERS[10:]
+    assert node.write_multiple_registers(start=20, registers=[7, 8, 9]).quantity == 3
+    assert node.write_single_register(number=11, value=0xFFFF).value == 0xFFFF
+    read = node.read_holding_registers(start=10, quantity=90).registers
+    assert read[:14] == [30, 0xFFFF, *REGISTERS[12:20], 7, 8, 9, REGISTERS[23]]
+    both = node.read_write_multiple_registers(read_start=0, read_quantity=3, write_start=1, registers=[1])
+    assert both.registers == [0, 1, REGISTERS[2]]
+    assert node.bus.engine.total.requests == node.bus.engine.total.answers == 5
+
+
+def test_our_bus_for_asyncio_reads(pty: PtyPort, server: None, framing: str) -> None:
+    async def run() -> list[Any]:
+        node = bus_of(f"modbus_{framing}").AsyncBus(pty, slack=5.0, echo="none").node(NODE)
+        asked = [node.read_holding_registers(start=start, quantity=2) for start in (3, 30)]
+        return [answer.registers for answer in await asyncio.gather(*asked)]
+
+    assert asyncio.run(run()) == [REGISTERS[3:5], REGISTERS[30:32]]
 
 
 @pytest.mark.parametrize("number", [1, 8, 37, 2000])
-def test_our_master_reads_coils_and_inputs(master: BlockingMaster, codec: Any, number: int) -> None:
-    coils = master.transact(codec.ReadCoilsRequest(node=NODE, start=0x13, quantity=number)).response
-    assert coils.coils == COILS[0x13 : 0x13 + number]
-    inputs = master.transact(codec.ReadDiscreteInputsRequest(node=NODE, start=5, quantity=number)).response
-    assert inputs.inputs == COILS[::-1][5 : 5 + number]
+def test_our_bus_reads_coils_and_inputs(node: Any, number: int) -> None:
+    assert node.read_coils(start=0x13, quantity=number).coils == COILS[0x13 : 0x13 + number]
+    inputs = node.read_discrete_inputs(start=5, quantity=number).inputs
+    assert inputs == COILS[::-1][5 : 5 + number]
 
 
-def test_an_exception_ends_a_call_at_once_with_its_code(master: BlockingMaster, codec: Any) -> None:
+def test_an_exception_ends_a_call_at_once_with_its_code(node: Any, codec: Any) -> None:
     begun = time.monotonic()
     with pytest.raises(Refused) as caught:
-        master.transact(codec.ReadHoldingRegistersRequest(node=NODE, start=99, quantity=2))
+        node.read_holding_registers(start=99, quantity=2)
     assert time.monotonic() - begun < 3, "without the exception it takes six seconds, and as long again"
     reply: Any = caught.value.reply
     assert reply.code == codec.ExceptionCode.ILLEGAL_DATA_ADDRESS
-    assert master.engine.total.requests == 1
+    assert node.bus.engine.total.requests == 1
 
 
-class Registers:
-    """A node with a hundred registers."""
+def registers(framing: str) -> Any:
+    """A slave with a hundred registers."""
+    codec: Any = codec_of(f"modbus_{framing}")
+    handlers: Any = bus_of(f"modbus_{framing}").SlaveHandlers
 
-    def __init__(self, codec: Any) -> None:
-        self.number = NODE
-        self.values = list(REGISTERS)
-        self._codec = codec
+    class Registers(handlers):  # type: ignore[misc]  # Any: generated at run time
+        def __init__(self) -> None:
+            super().__init__(NODE)
+            self.values = list(REGISTERS)
 
-    def handle(self, request: Any, now: float) -> Any:
-        codec = self._codec
-        match request:
-            case codec.ReadHoldingRegistersRequest(start=start, quantity=quantity):
-                if start + quantity > len(self.values):
-                    code = codec.ExceptionCode.ILLEGAL_DATA_ADDRESS
-                    raise Refusal(codec.ReadHoldingRegistersException(node=NODE, code=code))
-                return codec.ReadHoldingRegistersResponse(
-                    node=NODE, registers=self.values[start : start + quantity]
-                )
-            case codec.ReadCoilsRequest(start=start, quantity=quantity):
-                return codec.ReadCoilsResponse(node=NODE, coils=COILS[start : start + quantity])
-            case codec.ReadDiscreteInputsRequest(start=start, quantity=quantity):
-                return codec.ReadDiscreteInputsResponse(node=NODE, inputs=COILS[start : start + quantity])
-            case codec.WriteSingleRegisterRequest(number=number, value=value):
-                self.values[number] = value
-                return codec.WriteSingleRegisterResponse(node=NODE, number=number, value=value)
-            case codec.WriteMultipleRegistersRequest(start=start, registers=registers):
-                self.values[start : start + len(registers)] = registers
-                return codec.WriteMultipleRegistersResponse(node=NODE, start=start, quantity=len(registers))
-        return None
+        def read_holding_registers(self, request: Any, now: float) -> Any:
+            if request.start + request.quantity > len(self.values):
+                code = codec.ExceptionCode.ILLEGAL_DATA_ADDRESS
+                raise Refusal(codec.ReadHoldingRegistersException(node=NODE, code=code))
+            read = self.values[request.start : request.start + request.quantity]
+            return codec.ReadHoldingRegistersResponse(node=NODE, registers=read)
+
+        def read_coils(self, request: Any, now: float) -> Any:
+            read = COILS[request.start : request.start + request.quantity]
+            return codec.ReadCoilsResponse(node=NODE, coils=read)
+
+        def read_discrete_inputs(self, request: Any, now: float) -> Any:
+            read = COILS[request.start : request.start + request.quantity]
+            return codec.ReadDiscreteInputsResponse(node=NODE, inputs=read)
+
+        def write_single_register(self, request: Any, now: float) -> Any:
+            self.values[request.number] = request.value
+            return codec.WriteSingleRegisterResponse(node=NODE)
+
+        def write_multiple_registers(self, request: Any, now: float) -> Any:
+            self.values[request.start : request.start + len(request.registers)] = request.registers
+            return codec.WriteMultipleRegistersResponse(node=NODE, quantity=len(request.registers))
+
+    return Registers()
 
 
 @pytest.fixture
-def slave(pty: PtyPort, codec: Any) -> Iterator[Registers]:
-    node, stopped = Registers(codec), threading.Event()
-    engine = SlaveEngine(codec, node)
-    thread = threading.Thread(target=serve, args=(pty, engine), kwargs={"stop": stopped.is_set})
-    thread.start()
-    yield node
-    stopped.set()
-    thread.join(10)
+def slave(pty: PtyPort, framing: str) -> Iterator[Any]:
+    made = registers(framing)
+    with bus_of(f"modbus_{framing}").Slave(pty, made).running():
+        yield made
 
 
-def test_our_slave_answers_its_client(pty: PtyPort, slave: Registers, framing: str) -> None:
+def test_our_slave_answers_its_client(pty: PtyPort, slave: Any, framing: str) -> None:
     from pymodbus.client import ModbusSerialClient
     from pymodbus.framer import FramerType
     from pymodbus.pdu import ModbusPDU
