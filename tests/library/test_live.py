@@ -4,72 +4,54 @@ from __future__ import annotations
 
 import contextlib
 import io
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-from qlinkgen.link import SlaveEngine
 from qlinkgen.transport import PtyPort, open_pty
-from qlinkgen.transport.serving import serve
-from tests.library.protocols import described, peer
+from tests.bus.wires import bus_of, codec_of
+from tests.library.protocols import peer
 
 #: Seconds, on a busy machine.
 PATIENCE = 10
 
-Handle = Callable[[Any], Any]
-
-
-class Device:
-    """A node whose handler is a function of the request."""
-
-    def __init__(self, number: int, handle: Handle) -> None:
-        self.number = number
-        self._handle = handle
-
-    def handle(self, request: Any, now: float) -> Any:
-        return self._handle(request)
-
 
 @contextlib.contextmanager
-def serving(name: str, number: int, handle: Handle, *others: int) -> Iterator[PtyPort]:
-    """Serve a device of a protocol on a pseudo-terminal, and others like it."""
-    stopped = threading.Event()
-    with open_pty() as port:
-        codec = described(name).module
-        engines = [SlaveEngine(codec, Device(each, handle)) for each in (number, *others)]
-        thread = threading.Thread(target=serve, args=(port, *engines), kwargs={"stop": stopped.is_set})
-        thread.start()
-        try:
-            yield port
-        finally:
-            stopped.set()
-            thread.join(10)
+def serving(name: str, *devices: Any) -> Iterator[PtyPort]:
+    """Serve devices of a protocol on a pseudo-terminal."""
+    with open_pty() as port, bus_of(name).Slave(port, *devices).running():
+        yield port
+
+
+def handlers(name: str) -> tuple[Any, Any]:
+    """The codec of a protocol, and the class of the handlers of its slaves."""
+    return codec_of(name), bus_of(name).SlaveHandlers
 
 
 def test_dynamixel_sdk_reads_and_writes_a_servo() -> None:
     peer("dynamixel_2")
     from dynamixel_sdk import COMM_SUCCESS, PortHandler, Protocol2PacketHandler
 
-    codec: Any = described("dynamixel_2").module
+    codec, base = handlers("dynamixel_2")
     table = bytearray(range(200))
 
-    def servo(request: Any) -> Any:
-        match request:
-            case codec.PingRequest():
-                return codec.PingResponse(node=3, model=0x0406, firmware=0x26)
-            case codec.ReadRequest(start=start, size=size) if start + size <= len(table):
-                return codec.ReadResponse(node=3, data=bytes(table[start : start + size]))
-            case codec.ReadRequest():
-                return codec.ReadFailed(node=3, error=codec.Error.DATA_RANGE)
-            case codec.WriteRequest(start=start, data=written) if start + len(written) <= len(table):
-                table[start : start + len(written)] = written
-                return codec.WriteResponse(node=3)
-            case _:
-                return codec.WriteResponse(node=3, error=codec.Error.DATA_RANGE)
+    class Servo(base):  # type: ignore[misc,valid-type]  # Any: generated at run time, as below
+        def ping(self, request: Any, now: float) -> Any:
+            return codec.PingResponse(node=3, model=0x0406, firmware=0x26)
 
-    with serving("dynamixel_2", 3, servo) as pty:
+        def read(self, request: Any, now: float) -> Any:
+            if request.start + request.size > len(table):
+                return codec.ReadFailed(node=3, error=codec.Error.DATA_RANGE)
+            return codec.ReadResponse(node=3, data=bytes(table[request.start : request.start + request.size]))
+
+        def write(self, request: Any, now: float) -> Any:
+            if request.start + len(request.data) > len(table):
+                return codec.WriteResponse(node=3, error=codec.Error.DATA_RANGE)
+            table[request.start : request.start + len(request.data)] = request.data
+            return codec.WriteResponse(node=3)
+
+    with serving("dynamixel_2", Servo(3)) as pty:
         port, packets = PortHandler(pty.path), Protocol2PacketHandler()
         assert port.openPort()
         port.setPacketTimeout = lambda length: port.setPacketTimeoutMillis(1000 * PATIENCE)
@@ -88,21 +70,23 @@ def test_dynamixel_sdk_reads_and_writes_an_older_servo() -> None:
     peer("dynamixel_1")
     from dynamixel_sdk import COMM_SUCCESS, PortHandler, Protocol1PacketHandler
 
-    codec: Any = described("dynamixel_1").module
+    codec, base = handlers("dynamixel_1")
     table = bytearray(range(50))
 
-    def servo(request: Any) -> Any:
-        match request:
-            case codec.PingRequest():
-                return codec.PingResponse(node=3)
-            case codec.ReadRequest(start=start, size=size) if start + size <= len(table):
-                return codec.ReadResponse(node=3, data=bytes(table[start : start + size]))
-            case codec.WriteRequest(start=start, data=data):
-                table[start : start + len(data)] = data
-                return codec.WriteResponse(node=3)
-        return codec.Range(node=3)
+    class Servo(base):  # type: ignore[misc,valid-type]
+        def ping(self, request: Any, now: float) -> Any:
+            return codec.PingResponse(node=3)
 
-    with serving("dynamixel_1", 3, servo) as pty:
+        def read(self, request: Any, now: float) -> Any:
+            if request.start + request.size > len(table):
+                return codec.Range(node=3)
+            return codec.ReadResponse(node=3, data=bytes(table[request.start : request.start + request.size]))
+
+        def write(self, request: Any, now: float) -> Any:
+            table[request.start : request.start + len(request.data)] = request.data
+            return codec.WriteResponse(node=3)
+
+    with serving("dynamixel_1", Servo(3)) as pty:
         port, packets = PortHandler(pty.path), Protocol1PacketHandler()
         assert port.openPort()
         port.setPacketTimeout = lambda _: port.setPacketTimeoutMillis(1000 * PATIENCE)
@@ -119,14 +103,13 @@ def test_dynamixel_sdk_reads_several_servos_at_once() -> None:
     peer("dynamixel_2")
     from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PortHandler, Protocol2PacketHandler
 
-    codec: Any = described("dynamixel_2").module
-    numbers = iter((7, 3))  # in the order of the request
+    codec, base = handlers("dynamixel_2")
 
-    def servo(request: Any) -> Any:
-        number = next(numbers)
-        return codec.SyncReadResponse(node=number, data=bytes((number, 1)))
+    class Servo(base):  # type: ignore[misc,valid-type]
+        def sync_read(self, request: Any, now: float) -> Any:
+            return codec.SyncReadResponse(node=self.number, data=bytes((self.number, 1)))
 
-    with serving("dynamixel_2", 7, servo, 3) as pty:
+    with serving("dynamixel_2", Servo(7), Servo(3)) as pty:
         port = PortHandler(pty.path)
         assert port.openPort()
         group = GroupSyncRead(port, Protocol2PacketHandler(), 132, 2)
@@ -143,19 +126,21 @@ def test_pyptzcontroller_asks_for_the_position() -> None:
     peer("pelco_d")
     from ptz_control_lib.ptz_controller import PtzControl
 
-    codec: Any = described("pelco_d").module
+    codec, base = handlers("pelco_d")
     seen = []
 
-    def camera(request: Any) -> Any:
-        seen.append(type(request).NAME)
-        match request:
-            case codec.QueryPanRequest():
-                return codec.QueryPanResponse(node=5, angle=123.45)
-            case codec.QueryTiltRequest():
-                return codec.QueryTiltResponse(node=5, angle=17.5)
-        return None
+    class Camera(base):  # type: ignore[misc,valid-type]
+        def handle(self, request: Any, now: float) -> Any:
+            seen.append(type(request).NAME)
+            return super().handle(request, now)
 
-    with serving("pelco_d", 5, camera) as pty, contextlib.redirect_stdout(io.StringIO()):
+        def query_pan(self, request: Any, now: float) -> Any:
+            return codec.QueryPanResponse(node=5, angle=123.45)
+
+        def query_tilt(self, request: Any, now: float) -> Any:
+            return codec.QueryTiltResponse(node=5, angle=17.5)
+
+    with serving("pelco_d", Camera(5)) as pty, contextlib.redirect_stdout(io.StringIO()):
         controller = PtzControl(pty.path, 5, 9600)
         assert controller.connect()
         controller.serial_port.timeout = PATIENCE
@@ -172,21 +157,21 @@ def test_yamspy_reads_a_flight_controller() -> None:
     peer("msp")
     from yamspy import MSPy
 
-    codec: Any = described("msp").module
-
-    def board(request: Any) -> Any:
-        match request:
-            case codec.AttitudeRequest():
-                return codec.AttitudeResponse(roll=-12.5, pitch=3.0, yaw=271)
-            case codec.SetMotorsRequest(motors=motors):
-                outputs.extend(motors)
-                return codec.SetMotorsResponse()
-            case codec.SaveRequest():
-                return codec.SaveUnsupported()
-        return None
-
+    codec, base = handlers("msp")
     outputs: list[int] = []
-    with serving("msp", 0, board) as pty:
+
+    class Board(base):  # type: ignore[misc,valid-type]
+        def attitude(self, request: Any, now: float) -> Any:
+            return codec.AttitudeResponse(roll=-12.5, pitch=3.0, yaw=271)
+
+        def set_motors(self, request: Any, now: float) -> Any:
+            outputs.extend(request.motors)
+            return codec.SetMotorsResponse()
+
+        def save(self, request: Any, now: float) -> Any:
+            return codec.SaveUnsupported()
+
+    with serving("msp", Board(0)) as pty:
         master = MSPy(pty.path, loglevel="CRITICAL", logfilename=None)
         master.INAV = False
         master.conn.timeout = PATIENCE
@@ -209,17 +194,17 @@ def test_sensirion_driver_reads_a_sensor() -> None:
     from sensirion_shdlc_driver import ShdlcConnection, ShdlcDevice, ShdlcSerialPort
     from sensirion_shdlc_driver.errors import ShdlcDeviceError
 
-    codec: Any = described("shdlc").module
+    codec, base = handlers("shdlc")
 
-    def sensor(request: Any) -> Any:
-        match request:
-            case codec.InformationRequest(kind=3):
-                return codec.InformationResponse(node=0, error=0, device=False, text="0123456789ABCDEF\0")
-            case codec.ResetRequest():
-                return codec.ResetResponse(node=0, error=67, device=False)
-        return None
+    class Sensor(base):  # type: ignore[misc,valid-type]
+        def information(self, request: Any, now: float) -> Any:
+            assert request.kind == 3
+            return codec.InformationResponse(node=0, error=0, device=False, text="0123456789ABCDEF\0")
 
-    with serving("shdlc", 0, sensor) as pty, ShdlcSerialPort(pty.path, 115200, PATIENCE) as port:
+        def reset(self, request: Any, now: float) -> Any:
+            return codec.ResetResponse(node=0, error=67, device=False)
+
+    with serving("shdlc", Sensor(0)) as pty, ShdlcSerialPort(pty.path, 115200, PATIENCE) as port:
         device = ShdlcDevice(ShdlcConnection(port), 0)
         assert device.get_serial_number() == "0123456789ABCDEF"
         with pytest.raises(ShdlcDeviceError):
@@ -232,13 +217,17 @@ def test_pyvesc_drives_a_motor() -> None:
     import serial
     from pyvesc.packet.codec import unframe
 
-    codec: Any = described("vesc").module
+    codec, base = handlers("vesc")
     values = codec.GetValuesResponse(fet=31.5, motor=40.0, speed=-1200, voltage=48.1, fault=3)
     seen = []
 
-    def motor(request: Any) -> Any:
-        seen.append(request)
-        return values if type(request) is codec.GetValuesRequest else None
+    class Motor(base):  # type: ignore[misc,valid-type]
+        def handle(self, request: Any, now: float) -> Any:
+            seen.append(request)
+            return super().handle(request, now)
+
+        def get_values(self, request: Any, now: float) -> Any:
+            return values
 
     def measured(line: serial.Serial) -> Any:
         """Ask until the whole answer is there; what was sent before it has been received then."""
@@ -251,7 +240,7 @@ def test_pyvesc_drives_a_motor() -> None:
             payload, _ = unframe(answer)
         return payload
 
-    with serving("vesc", 0, motor) as pty, serial.Serial(pty.path, timeout=PATIENCE) as line:
+    with serving("vesc", Motor(0)) as pty, serial.Serial(pty.path, timeout=PATIENCE) as line:
         for message in (pyvesc.SetDutyCycle(25_000), pyvesc.SetRPM(-1200), pyvesc.SetCurrent(1500)):
             line.write(pyvesc.encode(message))
             # Its fields are those of an older firmware, so it cannot name them.
