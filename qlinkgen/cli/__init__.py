@@ -26,6 +26,7 @@ COMMANDS = {
     "simulate": "Simulate nodes, a ring or a chip set on a new port, with optional faults.",
     "scan": "Find the nodes of a bus.",
     "send": "Send one request on a port and print its response, or one message into a ring.",
+    "shell": "Send requests to a bus line by line, with completion and units.",
     "fuzz": "Send valid, wrong and damaged frames to a device, and report what it does wrong.",
     "load": "Load an Intel HEX file into a Q.link node.",
     "monitor": "Listen to a bus or a fibre: requests, responses, repeats, late and damaged frames.",
@@ -39,7 +40,7 @@ class LazyGroup(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  # click's interface
         """Names, in the order of a user's work."""
-        return list(COMMANDS)
+        return [*COMMANDS]  # the name of the builtin is that of a module here, once it is imported
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         """Import a command when it is used."""
@@ -66,7 +67,7 @@ class LazyGroup(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """List the commands from the table above."""
         with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+            formatter.write_dl([*COMMANDS.items()])
 
 
 @click.command(

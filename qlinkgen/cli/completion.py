@@ -6,7 +6,7 @@ a schema with errors or an unknown word: there is nothing to complete then.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import click
@@ -41,8 +41,11 @@ def _schemas_here() -> list[str]:
 def messages(context: click.Context, parameter: click.Parameter, incomplete: str) -> Items:  # noqa: ARG001
     """Complete a command or a message of the protocol."""
     protocol = _loaded(context)
-    if protocol is None:
-        return []
+    return [] if protocol is None else message_items(protocol, incomplete)
+
+
+def message_items(protocol: Protocol, incomplete: str) -> Items:
+    """Return the commands and messages whose names begin so."""
     commands = [CompletionItem(each.name, help=one_line(each.doc)) for each in protocol.commands]
     others = [CompletionItem(each.name, help=one_line(each.doc)) for each in protocol.messages]
     return [each for each in (*commands, *others) if each.value.startswith(incomplete)]
@@ -56,13 +59,16 @@ def assignments(context: click.Context, parameter: click.Parameter, incomplete: 
     message, protocol = _message(context), _loaded(context)
     if message is None or protocol is None:
         return []
+    return assignment_items(protocol, message, context.params.get("assignments") or (), incomplete)
+
+
+def assignment_items(protocol: Protocol, message: Message, words: Sequence[str], incomplete: str) -> Items:
+    """Return FIELD= and values of fields that begin so; ``words`` are those before."""
     values = {value.name: value for value in (*protocol.beside(message), *message.values)}
-    words: tuple[str, ...] = context.params.get("assignments") or ()
-    before, given = words[-1:], {word.partition("=")[0] for word in words if word != "="}
-    if before == ("=",) and words[-2:-1]:
-        return _values(values, words[-2], incomplete)
-    if before and before[0] in values:
-        return _values(values, before[0], incomplete)
+    given = {word.partition("=")[0] for word in words if word != "="}
+    last = words[-2:] if words and words[-1] == "=" else words[-1:]
+    if last and last[0] in values:
+        return _values(values, last[0], incomplete)
     name, mark, begun = incomplete.partition("=")
     if mark:
         found = _values(values, name, begun)

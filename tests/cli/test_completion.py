@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -83,6 +84,11 @@ complete_words "$0" encode qlink node_info.response position_type =
 complete_words "$0" encode qlink node_info.response position_type = j
 complete_words "$0" encode qlink node_info.response position_type = none ser
 """
+
+
+def test_after_the_module_of_list_was_imported(complete: Complete) -> None:
+    importlib.import_module("qlinkgen.cli.list")
+    assert complete("li") == ["lint", "list"]
 
 
 def test_bash_splits_words_at_the_equals_sign(tmp_path: Path) -> None:

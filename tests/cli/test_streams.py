@@ -32,6 +32,7 @@ RUNS: dict[str, tuple[list[str], int]] = {
     "simulate": (["trio", "--nodes", "1"], 2),
     "scan": (["qlink", "/dev/null"], 1),
     "send": (["qlink", "/dev/null", "motor_position", "--node", "3"], 1),
+    "shell": (["qlink", "/dev/null"], 1),
     "fuzz": (["qlink", "/dev/null", "--node", "3"], 1),
     "load": (["qlink", "/dev/null", "thermo.yaml", "--node", "3"], 1),
     "monitor": (["qlink", "/dev/null"], 1),
