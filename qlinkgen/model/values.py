@@ -181,13 +181,18 @@ def from_json(value: Value, given: Json) -> Native:
 
 
 def natives_of(values: Sequence[Value], given: Mapping[str, Json], owner: str = "") -> dict[str, Native]:
-    """The native values of those given, by name; of a choice, that of the case which is sent.
+    """The native values of those given, by name, and those that a condition on them decides.
+
+    These are the default or None; of a choice, the value of the case which is sent.
 
     ``owner`` precedes the names in errors.
     """
     plain = [value for value in values if not value.field.slot]
     found = {each.name: _of_json(each, given, owner) for each in plain if each.name in given}
     numbers = {each.name: found.get(each.name, default_of(each)) for each in plain}
+    for each in plain:
+        if each.field.when and each.name not in given:
+            numbers[each.name] = found[each.name] = _usual(each, numbers.get)
     for each in chosen(values, numbers.get):
         if each.field.slot:
             found[each.name] = (

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from decimal import Decimal
 from typing import TYPE_CHECKING, cast
 
 from qlinkgen.model.fields import chosen
 from qlinkgen.model.message import Example, Message, Value
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.values import BadValue, Json, default_of, from_json, to_json
+from qlinkgen.model.values import BadValue, Json, Native, default_of, from_json, to_json
 from qlinkgen.schema.file_commands import ExampleSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.notation import shown
@@ -162,13 +163,21 @@ class _Checker:
                 continue  # probably misspelt
             found = to_json(value, native_of(step, raws[value.name]))
             try:
-                native = from_json(value, cast("Json", given[key])) if key in given else default_of(value)
+                native = from_json(value, cast("Json", given[key])) if key in given else _usual(value, raws)
             except BadValue as bad:
                 self._error((*path, key), str(bad), f"these bytes have {_text(found)}")
                 continue
             if to_json(value, native) != found:
                 what = f"{key} is {_text(found)} in these bytes"
                 self._error((*path, key), what, "correct one of both", of_key=key not in given)
+
+
+def _usual(value: Value, raws: Mapping[str, Raw]) -> Native:
+    """The default of a value; one with a condition has it wherever the bytes have the field."""
+    if not value.field.when:
+        return default_of(value)
+    sent = raws[value.name] is not None
+    return default_of(replace(value, field=replace(value.field, given=sent)))
 
 
 def _key(name: str) -> str:
