@@ -12,6 +12,7 @@ from pathlib import Path
 
 from qlinkgen.backends import c
 from qlinkgen.backends.base import Options
+from qlinkgen.backends.c.framing import payload_arguments
 from qlinkgen.backends.c.names import Names
 from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds
 from qlinkgen.model.message import Field, Message
@@ -170,7 +171,9 @@ def _encoding(names: Names, message: Message) -> list[str]:
 
 def _call(names: Names, message: Message) -> tuple[str, list[str]]:
     # cbmc assumes any value for an uninitialised variable.
-    return ("&message, ", [f"    {names.function(message)}_t message;"]) if message.values else ("", [])
+    held = [f"    {names.function(message)}_t message;"] if message.values else []
+    beside = [f"    {names.prefix}_parts_t parts;"] if message.decided_by else []
+    return payload_arguments(message, "&message", "&parts"), [*held, *beside]
 
 
 def shrunk(protocol: Protocol, most: int) -> Protocol:

@@ -61,13 +61,21 @@ class _Source:
     def _show(self, message: Message) -> None:
         if not message.values:
             return
+        beside = ", const @p@_parts_t *parts" if message.decided_by else ""
         self._add(
-            f"static void show_{self.names.stem(message)}(const {self.names.function(message)}_t *m)", "{"
+            f"static void show_{self.names.stem(message)}(const {self.names.function(message)}_t *m{beside})",
+            "{",
+            *(["    (void)parts;"] if beside else []),
         )
         for value in message.values:
             if told := _presence(message, value):
                 self._add(f'    printf(" %d", m->{told} ? 1 : 0);')
-            self._add(*(f"    {line}" for line in _guarded(message, value, "m->", _printed(value, "m->"))))
+            self._add(
+                *(
+                    f"    {line}"
+                    for line in _guarded(message, value, "m->", _printed(value, "m->"), "parts->")
+                )
+            )
         self._add("}")
 
     def _encode(self, message: Message) -> None:
@@ -92,12 +100,13 @@ class _Source:
         for value in message.values:
             if told := _presence(message, value):
                 self._add(f"    m.{told} = strtoul(word(), NULL, 0) != 0ul;")
-            self._add(*(f"    {line}" for line in _guarded(message, value, "m.", _parsed(value, "m."))))
+            self._add(
+                *(f"    {line}" for line in _guarded(message, value, "m.", _parsed(value, "m."), "parts."))
+            )
         call = "&m, " if has_struct else ""
         if message.fields:
-            self._add(
-                f"    size = {function}_encode({call}payload, {self.names.constant(message)}_MAX_SIZE);"
-            )
+            given, most = call + ("&parts, " if message.decided_by else ""), self.names.constant(message)
+            self._add(f"    size = {function}_encode({given}payload, {most}_MAX_SIZE);")
             self._add("    if (size < 0) { fail(size); return; }")
         self._add(f"    total = {function}_to_frame({call}{self._whom(message)}wire, sizeof wire);")
         self._add("    if (total < 0) { fail(total); return; }", '    printf("ok");')
@@ -119,15 +128,19 @@ class _Source:
     def _decode(self, message: Message) -> None:
         function, stem = self.names.function(message), self.names.stem(message)
         struct = f"    {function}_t m = {self.names.constant(message)}_INIT;" if message.values else ""
+        decided = bool(message.decided_by)
         call, shown = ("&m, ", f"    show_{stem}(&m);") if message.values else ("", "")
+        told = f"    show_{stem}(&m, &initial);" if decided and shown else shown
         decode = (
-            f"{function}_decode({call}bytes_a, size)"
+            f"{function}_decode({call}{'&initial, ' if decided else ''}bytes_a, size)"
             if message.fields
             else "(size == 0u) ? @P@_OK : @P@_ERROR_LENGTH"
         )
         self._add(f"static void payload_{stem}(void)", "{", struct)
+        if decided:
+            self._add("    const @p@_parts_t initial = @P@_PARTS_INIT;")
         self._add("    const size_t size = from_hex(word(), bytes_a);", f"    const int status = {decode};")
-        self._add("    if (status != @P@_OK) { fail(status); return; }", '    printf("ok");', shown, "}")
+        self._add("    if (status != @P@_OK) { fail(status); return; }", '    printf("ok");', told, "}")
         self._add(
             f"static void decode_{stem}(void)",
             "{",
@@ -152,6 +165,8 @@ class _Source:
                 "    if (status != @P@_OK) { fail(status); return; }", '    printf("ok -");', shown, "}"
             )
             return
+        if decided:
+            call, shown = f"{call}&frame.parts, ", f"    show_{stem}(&m, &frame.parts);" if shown else ""
         self._decode_frame(message, call, shown)
 
     def _sum(self) -> str:
@@ -381,16 +396,23 @@ def _is_optional(value: Value) -> bool:
     return value.field.conditional and not value.field.slot
 
 
-def _guarded(message: Message | Layout, value: Value, owner: str, lines: list[str]) -> list[str]:
-    """The statements for a value; those of a case only where the tested number selects it."""
+def _guarded(
+    message: Message | Layout, value: Value, owner: str, lines: list[str], parts: str = ""
+) -> list[str]:
+    """The statements for a value; those of a case only where the tested number selects it.
+
+    `parts` precedes the values of the frame.
+    """
+    beside = message.decided_by if isinstance(message, Message) else ()
     if not value.field.slot:
         return lines
     terms = []
     for test in value.field.when:
-        kind = next(each.type for each in message.values if each.name == test.value)
+        kind = next(each.type for each in (*beside, *message.values) if each.name == test.value)
+        place = parts if test.value in {each.name for each in beside} else owner
         signed = isinstance(kind, Scalar) and kind.signed
         cast, end = ("(long long)", "ll") if signed else ("(unsigned long long)", "ull")
-        number = f"{cast}{owner}{naming.member(test.value)}"
+        number = f"{cast}{place}{naming.member(test.value)}"
         ranges = [f"({number} >= {low}{end} && {number} <= {high}{end})" for low, high in test.ranges]
         terms.append(f"{'!' if test.negated else ''}({' || '.join(ranges)})")
     return [f"if ({' && '.join(terms)}) {{", *lines, "}"]

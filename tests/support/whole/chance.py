@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, islice
 
@@ -60,14 +60,17 @@ def values(message: Message, rng: random.Random, mark: int) -> dict[str, Raw]:
         if not met(tests, {each: raw for each, raw in found.items() if isinstance(raw, int)}):
             found[name] = dict(message.beside)[name].default
     for attempt in range(12):
-        inner = _of_slots(message.slots, rng, mark, short=attempt > 1, shortest=attempt > 5, message=message)
+        inner = _of_slots(
+            message.slots, rng, mark, short=attempt > 1, shortest=attempt > 5, message=message, beside=found
+        )
         inner = {name: _between(raw, message.barred) for name, raw in inner.items()}
         try:
-            encode(message, inner)
+            encode(message, found | inner)
         except Wrong:  # records of variable size can be too many together
             continue
         return found | inner
-    return found | default_record(Record(message.slots))
+    decided = {name: kind.default for name, kind in message.beside if name in message.decided_by}
+    return found | decided | default_record(Record(message.slots))
 
 
 def _of_slots(
@@ -78,12 +81,14 @@ def _of_slots(
     short: bool = False,
     shortest: bool = False,
     message: Message | None = None,
+    beside: Mapping[str, Raw] | None = None,
 ) -> dict[str, Raw]:
     separated = message is not None and bool(message.separator)
     found: dict[str, Raw] = {}
     left_out = False
     for slot in slots:
-        sent = holds(slot, {name: raw for name, raw in found.items() if isinstance(raw, int)})
+        known = {**(beside or {}), **found}
+        sent = holds(slot, {name: raw for name, raw in known.items() if isinstance(raw, int)})
         if slot.optional:
             left_out = (left_out and not separated) or rng.random() < 0.3
             sent = not left_out

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from tests.support.whole import frames, kinds, words
+from tests.support.whole.decided import decide
 from tests.support.whole.fields import FieldMaker, Room
 from tests.support.whole.frames import Shape
 from tests.support.whole.kinds import Kinds
@@ -263,6 +264,8 @@ class _Maker:
             found |= self._several(shape, maker, bus, taken, kinds, attributes="attributes" in found)
         self._seeds(shape, found)
         settle(rng, shape, found)
+        if self.seed % 4:
+            decide(random.Random(f"decided {self.seed}"), shape, found)
         return found
 
     def _several(

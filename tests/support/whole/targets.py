@@ -48,6 +48,8 @@ from tests.support.whole.reference.values import default, holds
 
 _EXACT = Context(prec=200)
 
+_NONE: Mapping[str, Raw] = {}
+
 
 @dataclass(frozen=True)
 class Heard:
@@ -98,13 +100,16 @@ class Target:
 
 def by_case(message: Message, value: Callable[[str, Value], Raw]) -> dict[str, Raw]:
     """Raw values; those of a choice under the name of each case. `value` gives one by its name."""
-    return {name: value(name, kind) for name, kind in message.beside} | _slots_by_case(message.slots, value)
+    beside = {name: value(name, kind) for name, kind in message.beside}
+    return beside | _slots_by_case(message.slots, value, beside)
 
 
-def _slots_by_case(slots: Sequence[Slot], value: Callable[[str, Value], Raw]) -> dict[str, Raw]:
+def _slots_by_case(
+    slots: Sequence[Slot], value: Callable[[str, Value], Raw], beside: Mapping[str, Raw] = _NONE
+) -> dict[str, Raw]:
     found: dict[str, Raw] = {}
     for slot in slots:
-        numbers = {name: raw for name, raw in found.items() if isinstance(raw, int)}
+        numbers = {name: raw for name, raw in {**beside, **found}.items() if isinstance(raw, int)}
         sent = not slot.choice or holds(slot, numbers)
         for name, kind in slot.values():
             found[name] = value(slot.choice or name, kind) if sent else None
@@ -376,7 +381,7 @@ class ConstructTarget(Target):
             if message.turned:
                 return (self._live.payload(message.name, natives),) * 2
             frame = self._live.frames[self.reference.direction_of(message)]
-            return self._live.payload(message.name, natives), frame.build(whole, request=request)
+            return self._live.payload(message.name, natives, beside), frame.build(whole, request=request)
         except ConstructError as error:
             raise Wrong("encode", str(error)) from None
 
@@ -476,7 +481,7 @@ class CTarget(Target):
         address, *found = self._ask("decode", message.name, wire.hex() or "-", *context)
         words = iter(found)
         values: dict[str, Raw] = {name: told(kind, _raw(kind, words)) for name, kind in message.beside}
-        values |= _raw_slots(message.slots, words)
+        values |= _raw_slots(message.slots, words, values)
         assert not list(words)
         return Seen(message.name, int(address) if message.addresses else None, values)
 
@@ -493,7 +498,7 @@ class CTarget(Target):
         pairs = zip(message.beside, numbers, strict=True)
         beside = {each: _raw(kind, iter((word,))) for (each, kind), word in pairs}
         try:
-            values = str({**beside, **decode_payload(message, _bytes(payload))})
+            values = str({**beside, **decode_payload(message, _bytes(payload), beside)})
         except Wrong as wrong:
             values = f"{payload}, which is refused: {wrong}"
         return Heard(int(at), kind, name, int(address) if message.addresses else None, values)
@@ -565,11 +570,14 @@ def _raw_record(kind: Record, words: Iterator[str]) -> dict[str, Raw]:
     return _raw_slots(kind.slots, words)
 
 
-def _raw_slots(slots: Sequence[Slot], words: Iterator[str]) -> dict[str, Raw]:
+def _raw_slots(
+    slots: Sequence[Slot], words: Iterator[str], beside: Mapping[str, Raw] = _NONE
+) -> dict[str, Raw]:
     values: dict[str, Raw] = {}
     for slot in slots:
         if slot.choice:
-            sent = holds(slot, {name: raw for name, raw in values.items() if isinstance(raw, int)})
+            known = {**beside, **values}
+            sent = holds(slot, {name: raw for name, raw in known.items() if isinstance(raw, int)})
             values |= {name: told(kind, _raw(kind, words)) if sent else None for name, kind in slot.values()}
             continue
         absent = slot.conditional and slot.values() and next(words) == "0"

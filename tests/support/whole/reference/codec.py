@@ -88,7 +88,9 @@ class Reference:
         self.address_name = addressed[0] if addressed else "address" if "marked" in shape else None
         if has_parties(data) and not addressed and asks(data):
             self.address_name = "node"
-        self.messages = document.messages(data, Fields(data, most), self.address_name is not None)
+        ways = [each for each in (self.requests, self.frame) if isinstance(each, Frame)]
+        fields = Fields(data, most, {name: kind for each in ways for name, kind in each.beside})
+        self.messages = document.messages(data, fields, self.address_name is not None)
         for frame in (self.frame, self.requests):
             if isinstance(frame, Frame):
                 frame.seeds = {each.number: document.seeds(data, each.name) for each in self.messages}
@@ -207,7 +209,7 @@ class Reference:
         faults = []
         for answer in self.asked.answers.get(self.decode("request", request).name, ()):
             try:
-                found = values.decode(answer, self.asked.payload(carried.values))
+                found = values.decode(answer, self.asked.payload(carried.values), beside)
             except Wrong as wrong:
                 faults.append(wrong)
             else:

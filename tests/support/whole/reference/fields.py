@@ -82,8 +82,12 @@ def _counting(fields: Mapping[str, Any]) -> Doc:
 class Fields:
     """Builds fields from their mappings."""
 
-    def __init__(self, document: Doc, payload_most: int) -> None:
-        """`payload_most` limits fields without a bound, and all fields together."""
+    def __init__(self, document: Doc, payload_most: int, beside: Mapping[str, Number] | None = None) -> None:
+        """`payload_most` limits fields without a bound, and all fields together.
+
+        `beside` are values of frames.
+        """
+        self._beside = beside or {}
         self._document = document
         self.most = payload_most
         self._order = document.get("byteorder", "big")
@@ -128,7 +132,8 @@ class Fields:
     def _cases(self, name: str, spec: Doc, before: list[Slot]) -> list[Slot]:
         """The cases of a choice as fields that exclude each other."""
         tag = spec["switch"].split(".")[-1]
-        number = dict(values_of(before))[tag]
+        known = {**self._beside, **dict(values_of(before))}
+        number = known[tag]
         assert isinstance(number, Number)
         keys = [self._wanted(key) for key in spec["cases"]]
         tests: list[Test] = [(tag, (key,), False) for key in keys]
@@ -144,7 +149,7 @@ class Fields:
                 slot = self._slot(f"{name}@{index}", self._resolved(kind))
             if kind:
                 when = _with_outer((test,), before)
-                defaults = {key: each.default for key, each in values_of(before) if isinstance(each, Number)}
+                defaults = {key: each.default for key, each in known.items() if isinstance(each, Number)}
                 given = all(is_met(each, defaults[each[0]]) for each in when)
                 found.append(replace(slot, when=when, given=given, choice=name))
         return found
@@ -152,7 +157,7 @@ class Fields:
     def _conditional(self, slot: Slot, spec: Doc, before: list[Slot]) -> Slot:
         """The slot with what decides whether it is present."""
         tests = _with_outer(self.tests(spec.get("if", {})), before)
-        values, holds = dict(values_of(before)), True
+        values, holds = {**self._beside, **dict(values_of(before))}, True
         for name, ranges, excluded in tests:
             number = values[name]
             assert isinstance(number, Number)
@@ -377,8 +382,9 @@ def _with_outer(tests: tuple[Test, ...], before: Sequence[Slot]) -> tuple[Test, 
     """Tests after those of the fields with the tested values: an absent one meets none."""
     found: list[Test] = []
     for test in tests:
-        holder = next(slot for slot in before if test[0] in (name for name, _ in slot.values()))
-        found += [each for each in (*holder.when, test) if each not in found]
+        holders = (slot for slot in before if test[0] in (name for name, _ in slot.values()))
+        outer = next((slot.when for slot in holders), ())  # a value of the frame has none
+        found += [each for each in (*outer, test) if each not in found]
     return tuple(found)
 
 

@@ -459,11 +459,13 @@ class Frame:
         """Values of every frame."""
         return tuple((name, kind) for part in self.parts for name, _, kind in part.values)
 
-    def values(self, cut: Mapping[str, bytes]) -> dict[str, Raw]:
-        """The values of a frame. Raises Wrong."""
+    def values(self, cut: Mapping[str, bytes], wanted: Collection[str] | None = None) -> dict[str, Raw]:
+        """The values of a frame, or those wanted. Raises Wrong."""
         found: dict[str, Raw] = {}
         for part in self.parts:
             for name, shift, kind in part.values:
+                if wanted is not None and name not in wanted:
+                    continue
                 if not self.has(part, cut):
                     found[name] = kind.default
                     continue

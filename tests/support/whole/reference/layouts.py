@@ -388,6 +388,13 @@ class Message:
         return {name: given[name] for name, _ in self.beside} | by_choice(self.slots, given)
 
     @property
+    def decided_by(self) -> frozenset[str]:
+        """Values of its frame that conditions test."""
+        return frozenset(test[0] for slot in self.slots for test in slot.when) & {
+            name for name, _ in self.beside
+        }
+
+    @property
     def walked(self) -> bool:
         """Whether the places of fields depend on values."""
         return any(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -59,16 +59,16 @@ class Receiver:
         offset: int,
         raw: bytes,
         *,
-        beside: Callable[[], Mapping[str, Raw]] = dict,
+        beside: Callable[[Collection[str] | None], Mapping[str, Raw]] = lambda _: {},
     ) -> Event:
         """The message of an intact frame, or the fault in its contents."""
         if message is None:
             return Event("unknown", self.at, offset, raw)
         try:
-            found = values.decode(message, payload())
+            found = values.decode(message, payload(), beside(message.decided_by))
             if address is not None and not message.allows(address):
                 raise Wrong("range")
-            around = beside()
+            around = beside(None)
             for name, kind in message.beside:
                 if name in around:
                     values.check(kind, int(str(around[name])))

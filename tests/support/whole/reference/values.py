@@ -361,14 +361,17 @@ def _encoded_run(kind: Run, given: Raw) -> bytes:
     return given + kind.end
 
 
-def decode(message: Message, payload: bytes) -> dict[str, Raw]:
-    """The values of a payload. Raises Wrong, for wrong lengths before values out of range."""
+def decode(message: Message, payload: bytes, beside: Mapping[str, Raw] | None = None) -> dict[str, Raw]:
+    """The values of a payload. Raises Wrong, for wrong lengths before values out of range.
+
+    `beside` are values of its frame.
+    """
     if not payload and message.empty_is_default:
         return {name: default(kind) for name, kind in message.values() if (name, kind) not in message.beside}
     if message.separator:
         return _between(message, payload)
     if message.walked:
-        return _walked(message, payload)
+        return _walked(message, payload, beside or {})
     values: dict[str, Raw] = {}
     if message.trim is not None:
         payload += bytes(max(0, message.sizes[1] - len(payload)))
@@ -393,9 +396,14 @@ def _segments(slots: Sequence[Slot]) -> list[list[Slot]]:
     return segments
 
 
-def _walked(message: Message, payload: bytes) -> dict[str, Raw]:
+def _walked(message: Message, payload: bytes, beside: Mapping[str, Raw]) -> dict[str, Raw]:
     """The values of a payload in which the places of fields depend on values."""
-    values, at = _Walk(message.slots, payload, message.sizes[1]).run(0, len(payload))
+    walk = _Walk(message.slots, payload, message.sizes[1])
+    for name, kind in message.beside:
+        raw = beside.get(name, kind.default)
+        if name in message.decided_by and isinstance(raw, int):
+            walk.numbers[name] = raw
+    values, at = walk.run(0, len(payload))
     if at != len(payload):
         raise Wrong("length", "bytes are left")
     return values
