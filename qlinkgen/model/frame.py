@@ -395,6 +395,17 @@ class DelimitedFrame:
         return tuple(found.values())
 
     @property
+    def deciding(self) -> tuple[Value, ...]:
+        """Values that fields of a payload may depend on: those that each frame has and callers give."""
+        owned = {
+            bits.name
+            for part in self.parts
+            for bits in part.bits
+            if not (part.when or bits.counting or bits.party)
+        }
+        return tuple(value for value in self.values if value.name in owned)
+
+    @property
     def payload(self) -> Part:
         """The payload."""
         return next(part for part in self.parts if part.role == "payload")

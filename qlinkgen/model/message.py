@@ -64,6 +64,8 @@ class Message:
     separator: bytes = b""
     #: It precedes the first field too.
     leading: bool = False
+    #: Values of its frame that conditions of its fields test.
+    decided_by: tuple[Value, ...] = ()
     #: What the frame allows, where all records together may be larger than that; None for others.
     limit: int | None = None
 

@@ -71,8 +71,9 @@ def _message(
     frames: tuple[FramePlan, ...], message: Message, options: Options, *, asked: bool
 ) -> MessagePlan:
     frame = frames[-1]
-    payload = payload_plan(message, frame.envelope.payload.trim)
     envelope = frame.with_check(checked=message.checksum).fixing(dict(message.settled))
+    beside = (member for _, member in envelope.values)
+    payload = payload_plan(message, frame.envelope.payload.trim, beside)
     size = envelope.overhead + payload.most
     if len(frames) > 1:
         # A payload of the greatest size need not be in the longest frame.

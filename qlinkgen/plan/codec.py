@@ -13,10 +13,10 @@ Every target checks a whole frame in this order:
 6. a wrong check value: ``crc``, or ``illegal`` if it signals a refused request;
 7. a message number that the direction does not have: ``unknown``; then a wrong check value that covers an
    attribute of the message: ``crc``;
-8. the payload: wrong sizes are ``length``, then illegal values ``range``, and wrong check values among the
-   fields ``crc``; last the address and the values
-   of the frame, ``range``. A payload in which fields may be absent is walked instead, in wire order: for
-   each field its size, ``length``, then its value, ``range`` (see `walk`).
+8. values of the frame that decide which fields the payload has: ``range``; the payload: wrong sizes are
+   ``length``, then illegal values ``range``, and wrong check values among the fields ``crc``; last the
+   address and the other values of the frame, ``range``. A payload in which fields may be absent is walked
+   instead, in wire order: for each field its size, ``length``, then its value, ``range`` (see `walk`).
 
 A frame that a terminator ends is decoded as a whole. Step 2 is: a wrong first constant is ``frame``; no
 terminator within the longest frame, or nothing before it, is ``length``; a wrong coding is ``stuffing``; a
@@ -33,7 +33,7 @@ is the first answer to the request whose payload is valid; if none is, the fault
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import assert_never
 
@@ -265,7 +265,8 @@ class Codec:
         for part in envelope.seeded:
             self._verify(part, envelope, taken, {**taken.cells, **dict(message.message.seeds)})
         try:
-            values = content.unpack(message.payload, taken.payload)
+            decided = _beside(envelope, taken, message.payload.decided_by)
+            values = content.unpack(message.payload, taken.payload, decided)
         except BadContent as bad:
             raise BadFrame(bad.kind, taken.end, bad.field) from None
         if message.allowed and taken.address is not None and not message.allowed.holds(taken.address):
@@ -280,7 +281,7 @@ class Codec:
         faults = []
         for message in self.plan.asked.get(self.decode(request, "request").message.name, ()):
             try:
-                values = content.unpack(message.payload, carried.payload)
+                values = content.unpack(message.payload, carried.payload, carried.beside)
                 return replace(carried, message=message, values=values)
             except BadContent as bad:
                 faults.append(BadFrame(bad.kind, end, bad.field))
@@ -326,10 +327,12 @@ def _absent(conditional: Conditional, beside: Mapping[str, Raw]) -> Mapping[str,
     return dict.fromkeys((part.name for part in conditional.parts), b"")
 
 
-def _beside(envelope: Envelope, taken: Taken) -> Mapping[str, int]:
-    """The values of a frame. Raises BadFrame."""
+def _beside(envelope: Envelope, taken: Taken, wanted: Collection[Member] | None = None) -> Mapping[str, int]:
+    """The values of a frame, or those wanted. Raises BadFrame."""
     found: dict[str, int] = {}
     for part, member in envelope.values:
+        if wanted is not None and member not in wanted:
+            continue
         if envelope.absent(part, taken.cells):
             found[member.name] = member.number.default
             continue

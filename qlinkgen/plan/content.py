@@ -43,6 +43,7 @@ from qlinkgen.plan.payload import (
 from qlinkgen.plan.separated import joined, visit
 from qlinkgen.plan.walk import Missing, Wrong, present
 
+_NONE: Mapping[str, object] = {}
 Raw: TypeAlias = "int | bytes | list[int] | Mapping[str, Raw] | Sequence[Mapping[str, Raw]] | None"
 
 
@@ -92,7 +93,10 @@ class MoreNeeded(Exception):
 
 
 def pack(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
-    """The payload with these values, defaults for missing ones. Raises Unsendable."""
+    """The payload with these values, defaults for missing ones. Raises Unsendable.
+
+    Values of the frame are among them.
+    """
     if plan.separator:
         return _pack_separated(
             plan, {each.name: values.get(each.name, default_of(each)) for each in plan.settable}
@@ -100,7 +104,7 @@ def pack(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
     if plan.walked:
         by_case = _by_case(plan, values)
         try:
-            return _pack_walked(plan, by_case)
+            return _pack_walked(plan, by_case, plan.decided(values))
         except Unsendable as unsendable:
             raise Unsendable(_public(plan, unsendable.field), unsendable.value) from None
     whole = {each.name: values.get(each.name, default_of(each)) for each in plan.settable}
@@ -121,9 +125,9 @@ def _pack_separated(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
 
 def _by_case(plan: PayloadPlan, values: Mapping[str, Raw]) -> dict[str, Raw]:
     """The values by field: that of a choice belongs to the case that is sent. Raises Unsendable."""
-    given = values
+    given: Mapping[str, Raw] = {**plan.decided(values), **values}
     if any(value_name(each) not in values for each in plan.settable):
-        given = {**defaults(plan), **values}
+        given = {**defaults(plan), **given}
     numbers = {name: value for name, value in given.items() if isinstance(value, int)}
     found: dict[str, Raw] = {}
     left: dict[str, Raw] = {}
@@ -152,10 +156,12 @@ def by_value(plan: PayloadPlan, found: Mapping[str, Raw]) -> dict[str, Raw]:
     return values
 
 
-def _pack_walked(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
+def _pack_walked(plan: PayloadPlan, values: Mapping[str, Raw], decided: Mapping[str, int]) -> bytes:
+    """The payload of values by field; ``decided`` are those of the frame."""
     data, left_out, counted = b"", False, _counted(plan, values)
     sizes = {each.name: {each.run: _size_of(plan, each.run, counted)} for each in plan.byte_counts}
     numbers = {name: value for name, value in values.items() if isinstance(value, int)}
+    numbers |= decided
     counts = {run.name: 0 if values[run.name] is None else _count(run, values[run.name]) for run in plan.runs}
     for segment in plan.segments:
         given = [values[each.name] is not None for each in segment.settable]
@@ -235,8 +241,12 @@ def defaults(plan: PayloadPlan) -> dict[str, Raw]:
 
 
 def with_decided(plan: PayloadPlan, values: Mapping[str, Raw]) -> dict[str, Raw]:
-    """These values, and the defaults of all other fields that are present with them."""
-    numbers = {name: value for name, value in {**defaults(plan), **values}.items() if isinstance(value, int)}
+    """These values, and the defaults of all other fields that are present with them.
+
+    Values of the frame may be among them.
+    """
+    given = {**defaults(plan), **plan.decided(values), **values}
+    numbers = {name: value for name, value in given.items() if isinstance(value, int)}
     found: dict[str, Raw] = {}
     for each in plan.settable:
         presence, name = each.presence, value_name(each)
@@ -360,12 +370,15 @@ def broken(rules: tuple[Condition, ...], value: int) -> bool:
 # Decoding ---------------------------------------------------------------------------------------------------
 
 
-def unpack(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
-    """The values of a payload; checks sizes first, then each step in wire order. Raises BadContent."""
+def unpack(plan: PayloadPlan, payload: bytes, beside: Mapping[str, object] = _NONE) -> dict[str, Raw]:
+    """The values of a payload; checks sizes first, then each step in wire order. Raises BadContent.
+
+    ``beside`` are raw values of the frame.
+    """
     if not payload and plan.empty_is_default:
         return defaults(plan)
     if plan.walked:
-        return _unpack_walked(plan, payload)
+        return _unpack_walked(plan, payload, beside)
     payload = plan.filled(payload)
     counts = count_items(plan, payload)
     values: dict[str, Raw] = {}
@@ -389,10 +402,10 @@ def _verify(step: FilledStep, payload: bytes, at: int, start: int, counts: Mappi
         raise BadContent(step.fault, step.name, at)
 
 
-def _unpack_walked(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
+def _unpack_walked(plan: PayloadPlan, payload: bytes, beside: Mapping[str, object]) -> dict[str, Raw]:
     values = _Values()
     try:
-        for each in visit(plan, payload):
+        for each in visit(plan, payload, beside):
             own, name = values.of(each.inside), value_name(each.step)
             if isinstance(each.step, FilledStep):
                 _verify_at(each, each.step, payload)
@@ -467,10 +480,15 @@ def _counts_of(step: Step, data: bytes) -> Mapping[str, int]:
     return {step.name: len(data) // step.item_size}
 
 
-def places(plan: PayloadPlan, payload: bytes) -> Iterator[tuple[Step, int]]:
-    """The steps of a valid payload, zeros at its end included, and their offsets, without absent ones."""
+def places(
+    plan: PayloadPlan, payload: bytes, beside: Mapping[str, object] = _NONE
+) -> Iterator[tuple[Step, int]]:
+    """The steps of a valid payload, zeros at its end included, and their offsets, without absent ones.
+
+    ``beside`` are raw values of the frame.
+    """
     if plan.walked:
-        for each in visit(plan, payload):
+        for each in visit(plan, payload, beside):
             if each.data is not None and not each.walked:
                 yield replace(each.step, name=each.prefix + each.step.name), each.at
         return

@@ -7,7 +7,7 @@ another fault are not listed: after a wrong inserted byte, for example, the chec
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import assert_never
@@ -492,6 +492,15 @@ class _Walk:
             self._fault("range", Rule.VALUE, cell.places[0], member, value)
         self.spans.append(Span(member, cell.places, cell.data, part.size, value, "range" if wrong else ""))
 
+    def _deciding(self, message: MessagePlan) -> Mapping[str, int]:
+        """The values of the frame that decide about fields of the payload, as far as received."""
+        found: dict[str, int] = {}
+        for part, member in self.envelope.values:
+            number = self._number_in(part, part.integer)
+            if member in message.payload.decided_by and number is not None:
+                found[member.name] = member.of(number)
+        return found
+
     def _bound(self, part: LengthPart) -> None:
         number = self._number_in(part, part.integer)
         if number is not None and not part.holds(number):
@@ -600,7 +609,12 @@ class _Walk:
         # A marked frame without room for its check value.
         crowded = check is not None and self.wanted.get(check.name) == 0
         full = message.payload.filled(data) if whole else data
-        fields = Fields(message.payload, full, sound=whole and not moved and not crowded)
+        beside = self._deciding(message)
+        legal = not any(
+            broken(each.conditions, beside.get(each.name, 0)) for each in message.payload.decided_by
+        )
+        sound = whole and not moved and not crowded and legal
+        fields = Fields(message.payload, full, sound=sound, beside=beside)
         if fields.bad or crowded or self.miscounted:
             inside = message.payload.least <= len(data) <= message.payload.most and not crowded
             kind = "frame" if isinstance(self.frame.end, ByMark) and not inside else "length"

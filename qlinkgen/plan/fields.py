@@ -34,6 +34,8 @@ from qlinkgen.plan.separated import visit
 from qlinkgen.plan.spans import Around, Span
 from qlinkgen.plan.walk import Wrong as WrongSize
 
+_NONE: Mapping[str, int] = {}
+
 
 @dataclass(frozen=True, slots=True)
 class Wrong:
@@ -64,11 +66,20 @@ class Fields:
         wrong: illegal values; empty if sizes are bad.
     """
 
-    def __init__(self, plan: PayloadPlan, payload: bytes, *, sound: bool, judging: bool = True) -> None:
+    def __init__(
+        self,
+        plan: PayloadPlan,
+        payload: bytes,
+        *,
+        sound: bool,
+        judging: bool = True,
+        beside: Mapping[str, int] = _NONE,
+    ) -> None:
         """Values are checked only if the payload is ``sound``: neither cut short nor wrongly stuffed.
 
-        Without ``judging``, they are not checked at all.
+        Without ``judging``, they are not checked at all. ``beside`` are raw values of the frame.
         """
+        self._beside = beside
         self._plan, self._payload, self._sound = plan, payload, sound
         self._learned: dict[str, int] = {}
         self.bad = False
@@ -92,7 +103,7 @@ class Fields:
         """Divide the payload segment by segment; values are judged up to the first wrong size."""
         at = 0
         try:
-            for each in visit(self._plan, self._payload):
+            for each in visit(self._plan, self._payload, self._beside):
                 if each.data is None or not each.walked:
                     self._between(at, each.at)
                     at = each.at

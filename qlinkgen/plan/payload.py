@@ -538,6 +538,7 @@ class PayloadPlan:
         leading: the separator precedes the first field too, so an empty text comes before it.
         trim: bytes that are sent at least where zeros at the end are not; None if all are sent. ``least``
             is then the minimum size without them.
+        decided_by: values of the frame that conditions test. They are legal where a payload is read.
     """
 
     steps: tuple[Step, ...]
@@ -550,6 +551,7 @@ class PayloadPlan:
     separator: bytes = b""
     leading: bool = False
     trim: int | None = None
+    decided_by: tuple[Member, ...] = ()
 
     def trimmed(self, payload: bytes) -> bytes:
         """A payload as sent, without zeros at its end."""
@@ -560,6 +562,11 @@ class PayloadPlan:
     def filled(self, payload: bytes) -> bytes:
         """A payload with the zeros at its end that were not sent."""
         return payload if self.trim is None else payload.ljust(self.most, b"\0")
+
+    def decided(self, values: Mapping[str, object]) -> dict[str, int]:
+        """Raw values of the frame that conditions test, by name; defaults for those not among ``values``."""
+        found = ((each.name, values.get(each.name, each.number.default)) for each in self.decided_by)
+        return {name: raw for name, raw in found if isinstance(raw, int)}
 
     @property
     def filled_in(self) -> tuple[FilledStep, ...]:

@@ -50,11 +50,14 @@ from qlinkgen.plan.payload import (
 )
 
 
-def payload_plan(message: Message, trim: int | None = None) -> PayloadPlan:
-    """Plan the payload of a message; see `PayloadPlan` for ``trim``."""
+def payload_plan(message: Message, trim: int | None = None, beside: Iterable[Member] = ()) -> PayloadPlan:
+    """Plan the payload of a message; see `PayloadPlan` for ``trim``. ``beside`` are values of its frame."""
     if message.separator:
         return _Planner(message.fields).separated(message)
     plan = _Planner(message.fields, message.limit).plan(empty_is_default=message.empty_is_default)
+    if message.decided_by:
+        names = {value.name for value in message.decided_by}
+        plan = replace(plan, decided_by=tuple(each for each in beside if each.name in names))
     return plan if trim is None else replace(plan, trim=trim, least=min(trim, plan.most))
 
 

@@ -6,12 +6,13 @@ A receiver checks the number of texts first; then, in wire order, the size of ea
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from qlinkgen.plan import walk
 from qlinkgen.plan.payload import BytesStep, ConstantStep, ItemsStep, PayloadPlan, ReservedStep, ValueStep
 from qlinkgen.plan.walk import Visit, Wrong
 
+_NONE: Mapping[str, object] = {}
 #: The steps that texts between separators can be.
 TextStep = ValueStep | ConstantStep | ReservedStep | BytesStep | ItemsStep
 
@@ -79,13 +80,14 @@ def _taken(step: TextStep, texts: list[bytes]) -> list[bytes]:
     return [] if own == [b""] and not step.length.minimum else own
 
 
-def visit(plan: PayloadPlan, payload: bytes) -> Iterator[Visit]:
+def visit(plan: PayloadPlan, payload: bytes, beside: Mapping[str, object] = _NONE) -> Iterator[Visit]:
     """The steps of a payload, each before its value is used to find later ones. Raises Wrong.
 
-    A list is visited once for each item, or once with no bytes if it has none.
+    A list is visited once for each item, or once with no bytes if it has none. ``beside`` are raw values of
+    the frame.
     """
     if not plan.separator:
-        yield from walk.visit(plan, payload)
+        yield from walk.visit(plan, payload, beside)
         return
     texts, at = payload.split(plan.separator), 0
     if not needed(plan) <= len(texts) <= most_texts(plan) or (plan.leading and texts[0]):

@@ -36,6 +36,7 @@ from qlinkgen.plan.payload import (
 )
 
 T = TypeVar("T")
+_NONE: Mapping[str, int] = {}
 
 
 class Wrong(ValueError):
@@ -85,7 +86,8 @@ def of_values(plan: PayloadPlan, values: Mapping[str, T]) -> dict[str, tuple[Hol
 
     Of a choice without a case that is present, the first one.
     """
-    numbers = {name: value for name, value in values.items() if isinstance(value, int)}
+    own = {name: value for name, value in values.items() if isinstance(value, int)}
+    numbers: Mapping[str, int] = {**plan.decided(values), **own}
     found: dict[str, tuple[Holder, T]] = {}
     for each in plan.settable:
         name, presence = value_name(each), each.presence
@@ -118,18 +120,23 @@ class Walk:
     """
 
     def __init__(
-        self, segments: Collection[Segment], last: Collection[Test] = (), *, measuring: bool = False
+        self,
+        segments: Collection[Segment],
+        last: Collection[Test] = (),
+        *,
+        known: Mapping[str, int] = _NONE,
+        measuring: bool = False,
     ) -> None:
         """Begin at the first segment; ``last`` tests values of the record.
 
-        ``measuring``: sizes alone matter.
+        ``known`` are raw values of the frame; ``measuring``: sizes alone matter.
         """
         tests = [test for each in segments if each.presence for test in each.presence.when]
         tests = list(deciding(segments)) if measuring else tests
         self._tested = {test.value for test in (*tests, *last)}
         self._last = tuple(last)
         self._sizes: dict[str, int] = {}
-        self.numbers: dict[str, int] = {}
+        self.numbers: dict[str, int] = dict(known)
         self.counts: dict[str, int] = {}
 
     def size(self, segment: Segment, at: int, left: int) -> int:
@@ -274,12 +281,13 @@ def inner_path(place: tuple[str, int | None]) -> str:
     return f"{name}." if index is None else f"{name}[{index}]."
 
 
-def visit(plan: PayloadPlan, payload: bytes) -> Iterator[Visit]:
+def visit(plan: PayloadPlan, payload: bytes, beside: Mapping[str, object] = _NONE) -> Iterator[Visit]:
     """The steps of a payload, each before its value is used to find later ones. Raises Wrong.
 
-    Walked records come after the steps in them.
+    Walked records come after the steps in them. ``beside`` are raw values of the frame.
     """
-    at = yield from _Visitor(payload).fields(plan.segments, Walk(plan.segments), 0, len(payload))
+    walk = Walk(plan.segments, known=plan.decided(beside))
+    at = yield from _Visitor(payload).fields(plan.segments, walk, 0, len(payload))
     if at != len(payload):
         raise Wrong("", at)
 

@@ -9,6 +9,7 @@ from qlinkgen.model.condition import Condition, Test, exclusive, turning_points
 from qlinkgen.model.fields import Field, Layout, Record, Records, Value, values_of
 from qlinkgen.model.types import Array, Blob, Characters, Count, Enum, Float, Scalar
 from qlinkgen.schema.file_fields import Fields
+from qlinkgen.schema.frame_values import FrameValues
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TestText, Wanted, shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -17,14 +18,28 @@ from qlinkgen.schema.source import Path
 _RULE = "bad-condition"
 #: The hint where no field comes before.
 _OWN = "name a field of the same message that comes before it"
+_FRAME: Path = ("frame",)
+_NO_VALUES = FrameValues()
 
 
 class ConditionBuilder:
     """Adds the conditions to the fields of one message."""
 
-    def __init__(self, specs: Fields, path: Path, report: Reporter, *, separated: bool = False) -> None:
-        """``specs`` are the fields as written; ``separated``: texts between separators, any may be empty."""
+    def __init__(
+        self,
+        specs: Fields,
+        path: Path,
+        report: Reporter,
+        *,
+        separated: bool = False,
+        beside: FrameValues = _NO_VALUES,
+    ) -> None:
+        """``specs`` are the fields as written; ``separated``: texts between separators, any may be empty.
+
+        ``beside`` are values of the frame.
+        """
         self._separated = separated
+        self._beside = beside
         self._specs = specs
         self._path = path
         self._report = report
@@ -56,7 +71,7 @@ class ConditionBuilder:
         place = (*self._path, field)
         spec = self._specs.get(field)
         rule = _RULE if spec is None or spec.case is None else "bad-switch"
-        self._report.error(rule, (*place, key), what, hint, of_key=True, needs=(place, self._path))
+        self._report.error(rule, (*place, key), what, hint, of_key=True, needs=(place, self._path, _FRAME))
 
     # Conditions
 
@@ -86,13 +101,16 @@ class ConditionBuilder:
     def _values(self, field: Field, before: Sequence[Field]) -> Mapping[str, Value]:
         """The values that a condition on a field may be about, by name."""
         found = (each for each in values_of(before) if each.field.slot != field.slot or not field.slot)
-        return {value.name: value for value in found}
+        return {**self._beside.known, **{value.name: value for value in found}}
 
     def _tested(self, field: Field, text: TestText, before: Sequence[Field]) -> Value | None:
         """The value that a condition names: of an earlier field, or of its bits."""
         key, values = "switch" if field.slot else "if", self._values(field, before)
         owner, _, bit = text.field.partition(".")
         value = values.get(bit or owner)
+        if value is None and (barred := self._beside.barred.get(bit or owner)):
+            self._error(field.name, key, *barred)
+            return None
         if value is None or (bit and value.field.name != owner):
             known = f"earlier fields with a value: {listed(values)}" if values else _OWN
             hint = did_you_mean(text.field, values, known)
@@ -144,7 +162,7 @@ class ConditionBuilder:
         for field in fields:
             if field.slot and field.when:
                 choices.setdefault(field.slot, []).append(field)
-        values = {value.name: value.type for value in values_of(fields)}
+        values = {value.name: value.type for value in (*self._beside.known.values(), *values_of(fields))}
         for slot, cases in choices.items():
             for index, case in enumerate(cases):
                 other = next((each for each in cases[:index] if not exclusive(each.when, case.when)), None)
@@ -172,10 +190,9 @@ class ConditionBuilder:
         inside = (raw for raw in raws if tested.minimum <= raw <= tested.maximum)
         return next((raw for raw in inside if not test.holds(raw)), None)
 
-    @staticmethod
-    def _holds(when: Condition, before: Sequence[Field]) -> bool:
+    def _holds(self, when: Condition, before: Sequence[Field]) -> bool:
         """Whether a condition holds for the defaults."""
-        values = {value.name: value.type for value in values_of(before)}
+        values = {value.name: value.type for value in (*self._beside.known.values(), *values_of(before))}
         kinds = [(test, values[test.value]) for test in when]
         return all(test.holds(kind.default) for test, kind in kinds if isinstance(kind, Scalar))
 

@@ -15,6 +15,7 @@ from qlinkgen.schema.counting import choice_fault, scale_fault, with_beside
 from qlinkgen.schema.file_fields import Fields, FieldSpec, RecordSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.filled import FilledBuilder
+from qlinkgen.schema.frame_values import FrameValues
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import Divider, shown, type_text
 from qlinkgen.schema.records import RecordBuilder
@@ -23,6 +24,7 @@ from qlinkgen.schema.source import Path
 from qlinkgen.schema.types import TypeBuilder
 
 _UNDIVIDED = Divider()
+_NO_VALUES = FrameValues()
 
 
 class FieldBuilder:
@@ -41,11 +43,18 @@ class FieldBuilder:
         self._records.check()
 
     def build(
-        self, specs: Fields, path: Path, asked: Collection[str] = (), *, divider: Divider = _UNDIVIDED
+        self,
+        specs: Fields,
+        path: Path,
+        asked: Collection[str] = (),
+        *,
+        divider: Divider = _UNDIVIDED,
+        beside: FrameValues = _NO_VALUES,
     ) -> tuple[Field, ...]:
         """The fields of one message, without those that cannot be built.
 
-        ``asked`` are those with a number of items from the request; ``divider`` is the separator of texts.
+        ``asked`` are those with a number of items from the request; ``divider`` is the separator of texts;
+        ``beside`` are values of its frame.
         """
         separated = bool(divider.byte)
         written = specs
@@ -62,7 +71,8 @@ class FieldBuilder:
                 of = spec.case
                 fields.append(field if of is None else replace(field, slot=of.slot, case=of.name))
         fields = with_beside(fields, specs, path, self._report)
-        fields = ConditionBuilder(specs, path, self._report, separated=separated).build(fields)
+        conditions = ConditionBuilder(specs, path, self._report, separated=separated, beside=beside)
+        fields = conditions.build(fields)
         fields = self._counted(fields, path, asked)
         fields = FilledBuilder(specs, path, self._report).build(fields)
         if not separated:

@@ -19,6 +19,7 @@ from qlinkgen.schema.file_base import Fact
 from qlinkgen.schema.file_commands import CommandSpec, MessageSpec
 from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.file_model import SchemaFile
+from qlinkgen.schema.frame_values import FrameValues, frame_values
 from qlinkgen.schema.notation import Divider, StatedId
 from qlinkgen.schema.pieces import IdBuilder
 from qlinkgen.schema.report import Reporter
@@ -121,7 +122,7 @@ class MessageBuilder:
             command=name,
             direction=direction,
             id=number,
-            fields=self._fields_of(layout),
+            fields=self._fields_of(layout, direction),
             doc=spec.doc,
             section=section,
             confirmed=spec.confirmed,
@@ -161,7 +162,7 @@ class MessageBuilder:
             command=command or name,
             direction=direction,
             id=number,
-            fields=self._fields_of(layout),
+            fields=self._fields_of(layout, direction),
             doc=spec.doc,
             section=spec.section,
             confirmed=spec.confirmed,
@@ -181,12 +182,13 @@ class MessageBuilder:
         usual = self._file.defaults.separator or Divider()
         return (usual if layout.separator is None else layout.separator) if layout.fields else Divider()
 
-    def _fields_of(self, layout: Written) -> tuple[Field, ...]:
+    def _fields_of(self, layout: Written, direction: Direction) -> tuple[Field, ...]:
         fields = self._fields.build(
             layout.fields,
             layout.path,
             layout.asked,
             divider=self._separator(layout),
+            beside=self._beside(layout, direction),
         )
         separator = self._separator(layout).byte
         if not separator:
@@ -195,6 +197,18 @@ class MessageBuilder:
             what = f"the size of {name} follows from the separator after it"
             self._report.error("bad-separator", (*layout.path, name), what, "write its range", of_key=True)
         return separated(fields, separator, self._frame, layout.path, self._report)
+
+    def _beside(self, layout: Written, direction: Direction) -> FrameValues:
+        """The values of the frame of a message; they matter only where a field has a condition."""
+        if not any(spec.when for spec in layout.fields.values()):
+            return FrameValues()
+        return frame_values(
+            self._frame,
+            direction,
+            [name for name, _ in self._settled(layout, direction)],
+            several=bool(self._file.frames),
+            separated=bool(self._separator(layout).byte),
+        )
 
     @property
     def ways(self) -> PartBits | None:
@@ -216,6 +230,9 @@ class MessageBuilder:
         return () if layout.inherited else self._ids.fixed(layout.number, direction, layout.number_path)
 
     def _added(self, message: Message, layout: Written) -> Message:
+        if tested := {test.value for field in message.fields for test in field.when}:
+            known = self._beside(layout, message.direction).known.values()
+            message = replace(message, decided_by=tuple(each for each in known if each.name in tested))
         if any(field.walked for field in message.fields):
             message = replace(message, limit=self._limits()[1])
         self.places[message.name] = layout.path
@@ -237,7 +254,7 @@ class MessageBuilder:
             command=name,
             direction=direction,
             id=number,
-            fields=self._fields_of(layout),
+            fields=self._fields_of(layout, direction),
             doc=spec.doc,
             section=spec.section,
             confirmed=spec.confirmed,

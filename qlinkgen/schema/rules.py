@@ -148,10 +148,11 @@ _ALL = (
     Rule(
         "bad-condition",
         "A field that may be absent depends on earlier values, or is at the end of the payload.",
-        "Receivers decide field by field whether it is present: an earlier field has a value for it, or the "
-        "payload ends before it. Where that field is absent by its own if, this one is too. Fields after one "
-        "that takes the rest are always present, or absent wherever it is present. A count has the condition "
-        "of the field that it counts.",
+        "Receivers decide field by field whether it is present: an earlier field, or the frame, has a value "
+        "for it, or the payload ends before it. Each frame has such a value, which its caller gives; the "
+        "frame has a length or a terminator, and is the only kind. Where that field is absent by its own if, "
+        "this one is too. Fields after one that takes the rest are always present, or absent wherever it is "
+        "present. A count has the condition of the field that it counts.",
     ),
     Rule(
         "bad-link",

@@ -16,8 +16,9 @@ from construct import ConstructError
 from qlinkgen.backends import construct, python, vectors
 from qlinkgen.backends.base import Options
 from qlinkgen.backends.python._records import BaseRecord
+from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.values import natives_of
+from qlinkgen.model.values import Native, natives_of
 from qlinkgen.plan import MessagePlan, Plan, plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.ends import ByTerminator
@@ -99,7 +100,7 @@ def test_every_right_vector_decodes_in_python_and_construct() -> None:
         module, live = module_of(plan), live_of(plan)
         for row in document["vectors"]:
             message = plan.message(row["message"])
-            fields = natives_of(message.message.values, row["fields"])
+            fields = natives(plan, message, row)
             found = decoded(module, plan, message, row)
             assert message.name == found.NAME
             assert {name: plain(getattr(found, name)) for name in fields} == fields, row
@@ -111,6 +112,14 @@ def test_every_right_vector_decodes_in_python_and_construct() -> None:
             # Not every kind of frame has one.
             assert address == (getattr(found, plan.frame.address, None) if plan.frame.address else None)
             assert address == parsed.get(plan.frame.address)
+
+
+def natives(plan: Plan, message: MessagePlan, row: Row) -> dict[str, Native]:
+    """The values of the payload of a vector; those of its frame decide about some."""
+    beside = plan.protocol.beside(message.message)
+    around = {value.name: row[record_key(value.name)] for value in beside}
+    found = natives_of((*beside, *message.message.values), around | row["fields"])
+    return {name: value for name, value in found.items() if name not in around}
 
 
 def plain(value: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from qlinkgen.backends.c.names import literal, storage
+from qlinkgen.model import naming
 from qlinkgen.model.condition import Test
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.payload import PayloadPlan
@@ -12,8 +13,22 @@ from qlinkgen.plan.payload import PayloadPlan
 
 def numbers_of(payload: PayloadPlan) -> dict[str, Scalar]:
     """The numbers that conditions may test, by name."""
-    found = {each.name: getattr(each, "number", None) for each in payload.settable}
+    holding = (*payload.decided_by, *payload.settable)
+    found = {each.name: getattr(each, "number", None) for each in holding}
     return {name: number for name, number in found.items() if isinstance(number, Scalar)}
+
+
+def place_of(payload: PayloadPlan, inside: str = "", parts: str = "parts->") -> Callable[[str], str]:
+    """What prints a tested value of a struct, or of its frame.
+
+    ``inside`` precedes the members of the struct, ``parts`` those of the frame.
+    """
+    beside = {each.name for each in payload.decided_by}
+
+    def place(name: str) -> str:
+        return (parts if name in beside else f"message->{inside}") + naming.member(name)
+
+    return place
 
 
 def condition(tests: Sequence[Test], numbers: dict[str, Scalar], value: Callable[[str], str]) -> str:

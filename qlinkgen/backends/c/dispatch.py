@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from qlinkgen.backends.c.echoes import of_reply, of_response
-from qlinkgen.backends.c.framing import Address, Expected, Function, expected
+from qlinkgen.backends.c.framing import Address, Expected, Function, expected, payload_arguments
 from qlinkgen.backends.c.names import Names, count_type, unsigned
 from qlinkgen.backends.c.settled import assigned, differing
 from qlinkgen.backends.c.several import Listed, listed_in
@@ -253,7 +253,7 @@ def _entry(
     command = exchange.command if exchange else None
     following = exchange.following if exchange else None
     function, answer_constant = names.function(message), names.constant(answer) if answer else ""
-    target = "&request, " if message.values else ""
+    target = payload_arguments(message, "&request", "&frame->parts")
     decoded = f"{function}_decode({target}frame->payload, frame->size) == {names.upper}_OK"
     refuses = bool(reject and answer)
     right = [

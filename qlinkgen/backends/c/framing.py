@@ -69,6 +69,7 @@ class Expected:
     """Conditions on a received frame of a message.
 
     Attributes:
+        received: the arguments of the function that decodes the payload in ``frame`` to a struct ``message``.
         allowed: condition on the address in ``frame``, "" if every address is legal.
         address_allowed: the condition on the address in a parameter.
     """
@@ -77,6 +78,7 @@ class Expected:
     function: str
     has_struct: bool
     has_bytes: bool
+    received: str
     allowed: str
     address_allowed: str
 
@@ -102,6 +104,18 @@ def struct_parameter(names: Names, message: Message, *, const: bool) -> str:
     return f"{'const ' if const else ''}{names.function(message)}_t *message, "
 
 
+def payload_parameters(names: Names, message: Message, *, const: bool) -> str:
+    """What functions of the payload take: the message, and the values of its frame that decide about it."""
+    parts = f"const {names.prefix}_parts_t *parts, " if message.decided_by else ""
+    return struct_parameter(names, message, const=const) + parts
+
+
+def payload_arguments(message: Message, struct: str = "message", parts: str = "parts") -> str:
+    """The arguments for `payload_parameters`, followed by a comma."""
+    given = [*([struct] if message.values else []), *([parts] if message.decided_by else [])]
+    return "".join(f"{each}, " for each in given)
+
+
 def address_group(message: MessagePlan, address: Address) -> AddressGroup | None:
     """The legal addresses of a message, None if every value of the C type is legal."""
     condition = allowed(message.allowed, address.name, storage(address.bits))
@@ -122,7 +136,7 @@ def to_frame(frame: FramePlan, names: Names, own: str, address: Address, message
         for test in differing(stated, address.values, "parts->")
         for line in (f"if ({test}) {{", f"    return {names.upper}_ERROR_RANGE;", "}")
     ]
-    lines, size = _payload_lines(names, own, message, bool(struct)) if stated.fields else ([], "0")
+    lines, size = _payload_lines(names, own, message) if stated.fields else ([], "0")
     group = address_group(message, address)
     wrap = f"{own}_wrap_{group.name}_" if group else f"{own}_wrap_"
     arguments = f"{names.constant(stated)}_ID, {address.argument}wire, capacity, {size}"
@@ -137,9 +151,9 @@ def _checked(frame: FramePlan, message: MessagePlan) -> str:
     return ", true" if message.checked else ", false"
 
 
-def _payload_lines(names: Names, own: str, plan: MessagePlan, has_struct: bool) -> tuple[list[str], str]:
+def _payload_lines(names: Names, own: str, plan: MessagePlan) -> tuple[list[str], str]:
     """Statements that encode the payload if it fits; otherwise wrapping fails."""
-    call, message = "message, " if has_struct else "", plan.message
+    call, message = payload_arguments(plan.message), plan.message
     constant = names.constant(message)
     if is_trimmed(plan.payload):
         return _trimmed_lines(names, own, plan, call), "size"
@@ -151,8 +165,8 @@ def _payload_lines(names: Names, own: str, plan: MessagePlan, has_struct: bool) 
         size = size_terms(message, "message->")
         if plan.payload.walked:
             size = (
-                f"{names.function(message)}_size_(message)"
-                if has_struct
+                f"{names.function(message)}_size_({call.removesuffix(', ')})"
+                if call
                 else f"{constant_size(plan.payload)}U"
             )
         lines.append(f"const size_t payload_size = {size};")
@@ -198,6 +212,8 @@ def expected(names: Names, address: Address, message: MessagePlan) -> Expected:
         function=names.function(message.message),
         has_struct=bool(message.message.values),
         has_bytes=bool(message.message.fields),
+        received=payload_arguments(message.message, "&message", "&frame->parts")
+        + "frame->payload, frame->size",
         allowed=_both(
             allowed(message.allowed, address.name and f"frame->{address.name}", address.bits),
             f"!({condition(refused)})" if refused else "",

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from qlinkgen.backends.c.conditions import condition, numbers_of
+from qlinkgen.backends.c.conditions import condition, numbers_of, place_of
 from qlinkgen.backends.c.dispatch import callback_name, handler_name
 from qlinkgen.backends.c.frames import frame_section
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.members import count_of, member_of
 from qlinkgen.backends.c.names import Names, count_type, scalar_type, storage, unsigned_type
 from qlinkgen.backends.c.types import Types
-from qlinkgen.model import naming
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Characters, Scalar
@@ -116,11 +115,12 @@ class Interface:
         return count_of(run)
 
     @staticmethod
-    def test(payload: PayloadPlan, presence: Presence, inside: str) -> str:
-        """The expression that is true if a struct has a field; ``inside`` precedes its members."""
-        return condition(
-            presence.when, numbers_of(payload), lambda name: f"message->{inside}{naming.member(name)}"
-        )
+    def test(payload: PayloadPlan, presence: Presence, inside: str, parts: str) -> str:
+        """The expression that is true if a struct has a field; ``inside`` precedes its members.
+
+        ``parts`` precedes those of the values of its frame.
+        """
+        return condition(presence.when, numbers_of(payload), place_of(payload, inside, parts))
 
     def count_width(self, most: int) -> int:
         """Size of the struct member that counts up to ``most``."""

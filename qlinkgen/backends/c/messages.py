@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import assert_never
@@ -11,7 +12,7 @@ from qlinkgen.backends.c import separated
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.describe import field_rows, member_note, message_head, record_head
 from qlinkgen.backends.c.encode import Encoder
-from qlinkgen.backends.c.framing import is_trimmed, struct_parameter
+from qlinkgen.backends.c.framing import is_trimmed, payload_arguments, payload_parameters
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.members import is_counted
 from qlinkgen.backends.c.names import Names, count_type, is_wide, scalar_literal, unsigned
@@ -71,6 +72,7 @@ class MessageView:
     encode: list[str] | None
     decode: list[str] | None
     scales: list[Kind]
+    measure_parameters: str
     encode_parameters: str
     decode_parameters: str
     size_text: str
@@ -147,12 +149,13 @@ class MessageWriter:
             members=members,
             notes=[f"{name}: {note}" for name, note in notes.items() if note],
             initialiser=self._initialisers(payload),
-            measure=self._measure(payload, self._same("size", shape, plan)) if plan.encoded else [],
+            measure=self._measure(plan, self._same("size", shape, plan)) if plan.encoded else [],
             encode=self._encode(plan, self._same("encode", shape, plan)) if plan.encoded else None,
             decode=self._decode(plan, self._same("decode", shape, plan)) if plan.decoded else None,
             scales=self._scales(self._names.function(message), payload),
-            encode_parameters=struct_parameter(self._names, message, const=True),
-            decode_parameters=struct_parameter(self._names, message, const=False),
+            measure_parameters=payload_parameters(self._names, message, const=True).removesuffix(", "),
+            encode_parameters=payload_parameters(self._names, message, const=True),
+            decode_parameters=payload_parameters(self._names, message, const=False),
             size_text=_size_text(payload.least, payload.most),
             comment_ends_at_head=not payload.steps and len(head) == 1,
         )
@@ -198,25 +201,27 @@ class MessageWriter:
             last = each.presence
         return ", ".join(found)
 
-    def _measure(self, payload: PayloadPlan, same: str) -> list[str]:
-        if not payload.walked or not payload.settable:
+    def _measure(self, plan: MessagePlan, same: str) -> list[str]:
+        payload = plan.payload
+        if not payload.walked or not (payload.settable or payload.decided_by):
             return []
         if same:
-            return [f"return {same}_size_(message);"]
-        return (
-            separated.size_lines(payload, self._layouts)
-            if payload.separator
-            else size_lines(payload, self._layouts.records)
-        )
+            return [f"return {same}_size_({payload_arguments(plan.message).removesuffix(', ')});"]
+        if payload.separator:
+            return separated.size_lines(payload, self._layouts)
+        return _using(plan, size_lines(payload, self._layouts.records))
 
     def _encode(self, plan: MessagePlan, same: str) -> list[str]:
-        own = "message, " if plan.payload.settable else ""
+        own = payload_arguments(plan.message)
         if same:
             return [f"return {same}_encode({own}payload, capacity);"]
         if plan.payload.walked:
-            make = separated.SeparatedEncoder if plan.payload.separator else WalkedEncoder
-            encoder = make(plan.payload, self._layouts, function=self._names.function(plan.message))
-            return [*encoder.statements(), "return (int)size;"]
+            function = self._names.function(plan.message)
+            if plan.payload.separator:
+                encoder: Encoder = separated.SeparatedEncoder(plan.payload, self._layouts, function=function)
+            else:
+                encoder = WalkedEncoder(plan.payload, self._layouts, function=function, arguments=own)
+            return _using(plan, [*encoder.statements(), "return (int)size;"])
         size = f"{self._names.constant(plan.message)}_MAX_SIZE" if plan.payload.fixed else "size"
         lines = Encoder(plan.payload, self._layouts).statements()
         if is_trimmed(plan.payload):
@@ -225,13 +230,13 @@ class MessageWriter:
         return [*lines, f"return (int){size};"]
 
     def _decode(self, plan: MessagePlan, same: str) -> list[str]:
-        own, ok = "message, " if plan.payload.settable else "", f"return {self._names.upper}_OK;"
+        own, ok = payload_arguments(plan.message), f"return {self._names.upper}_OK;"
         if same:
             return [f"return {same}_decode({own}payload, size);"]
         if plan.payload.walked:
             init = f"{self._names.constant(plan.message)}_INIT"
             make = separated.SeparatedDecoder if plan.payload.separator else WalkedDecoder
-            return [*make(plan.payload, self._layouts, init=init).statements(), ok]
+            return _using(plan, [*make(plan.payload, self._layouts, init=init).statements(), ok])
         decoder, empty = Decoder(plan.payload, self._layouts), list[str]()
         if plan.payload.empty_is_default and plan.payload.least > 0:
             empty = ["if (size == 0U) {", *(f"    {line}" for line in [*self._defaults(plan), ok]), "}"]
@@ -369,6 +374,16 @@ class MessageWriter:
             case _:
                 assert_never(each)
         return f"{kind} {name}{many}"
+
+
+def _using(plan: MessagePlan, lines: list[str]) -> list[str]:
+    """The statements; where values of the frame decide about fields, they may not use a parameter."""
+    if not plan.payload.decided_by:
+        return lines
+    text = "\n".join(lines)
+    names = payload_arguments(plan.message).split(", ")[:-1]
+    unused = [name for name in names if not re.search(rf"\b{name}(->| =|,|\))", text)]
+    return [*(f"(void){name};" for name in unused), *lines]
 
 
 def _items_word(run: RunStep) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from qlinkgen.backends.c import checks, varied
-from qlinkgen.backends.c.conditions import condition, numbers_of
+from qlinkgen.backends.c.conditions import condition, numbers_of, place_of
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.encode import Encoder
 from qlinkgen.backends.c.members import count_of, member_of
@@ -35,21 +35,16 @@ def has_member(segment: Segment) -> str:
     return f"has_{presence.field}" if presence and not presence.slot and segment.settable else ""
 
 
-def _in_struct(name: str) -> str:
-    return f"message->{naming.member(name)}"
-
-
 def size_lines(payload: PayloadPlan, records: Mapping[str, str]) -> list[str]:
     """Body of the function that returns the size of the payload of a struct.
 
     ``records`` are the prefixes of the functions of records.
     """
-    numbers = numbers_of(payload)
     always = sum(each.size or 0 for each in payload.segments if each.presence is None)
     lines = [f"size_t size = {always}U;"]
     for segment in payload.segments:
         if segment.presence is not None or segment.size is None:
-            lines += _guarded(_sent(segment.presence, numbers), _added(segment, records, "size"))
+            lines += _guarded(_sent(segment.presence, payload), _added(segment, records, "size"))
     return [*lines, "return size;"]
 
 
@@ -69,13 +64,13 @@ def _struct_size(segment: Segment) -> str:
     return f"{run.item_size}U * {count}" if run.item_size > 1 else count
 
 
-def _sent(presence: Presence | None, numbers: dict[str, Scalar]) -> str:
+def _sent(presence: Presence | None, payload: PayloadPlan) -> str:
     """The condition under which a segment is sent, "" if it always is."""
     if presence is None:
         return ""
     if presence.optional:
         return f"message->has_{presence.field}"
-    return condition(presence.when, numbers, _in_struct)
+    return condition(presence.when, numbers_of(payload), place_of(payload))
 
 
 def _guarded(test: str, lines: Iterable[str]) -> list[str]:
@@ -90,13 +85,15 @@ class WalkedEncoder(Encoder):
     """Collects the statements that encode one message segment by segment."""
 
     function: str = ""
+    #: The arguments of the functions of the message.
+    arguments: str = ""
 
     def statements(self) -> list[str]:
         """Lines of the function body, without the last one."""
         lines: list[str] = []
         for run in self.payload.runs:
             lines.append(self._number_in_struct(run))
-        lines += [f"const size_t size = {self.function}_size_(message);", ""]
+        lines += [f"const size_t size = {self.function}_size_({self.arguments.removesuffix(', ')});", ""]
         lines += self._checks()
         if any(segment.records for segment in self.payload.segments):
             self._refuse([f"size > {self.payload.most}U"], "LENGTH")
@@ -124,7 +121,7 @@ class WalkedEncoder(Encoder):
         """The declaration of a number of items; a member of a union is read only where its case is sent."""
         kind, number = count_type(run.length.maximum), f"message->{count_of(run)}"
         if run.presence is not None and run.presence.slot:
-            sent = condition(run.presence.when, numbers_of(self.payload), _in_struct)
+            sent = condition(run.presence.when, numbers_of(self.payload), place_of(self.payload))
             number = f"({kind})(({sent}) ? {number} : 0U)"
         return f"const {kind} {local(run.name)} = {number};"
 
@@ -169,7 +166,7 @@ class WalkedEncoder(Encoder):
             lines, self.lines = self.lines, outer
         inner = [f"size_t {total} = 0U;", ""]
         for segment in self.payload.counted(step.run):
-            test = _sent(segment.presence, numbers_of(self.payload)) if segment.counted else ""
+            test = _sent(segment.presence, self.payload) if segment.counted else ""
             inner += _guarded(test, _added(segment, self.layouts.records, total))
         inner += lines
         return ["{", *(f"    {line}" if line else "" for line in inner), "}"]
@@ -198,7 +195,7 @@ class WalkedEncoder(Encoder):
 
     def _if_sent(self, segment: Segment) -> list[str]:
         """The statements collected so far, for a segment that is sent."""
-        return _guarded(_sent(segment.presence, numbers_of(self.payload)), self._flushed())
+        return _guarded(_sent(segment.presence, self.payload), self._flushed())
 
     def _checks(self) -> list[str]:
         """Statements that check numbers of items, then values."""
@@ -250,10 +247,15 @@ class WalkedDecoder(Decoder):
         numbers = numbers_of(self.payload)
         self.reads = True
         kind = self.init.removesuffix("_INIT").lower()
-        lines = [f"const {kind}_t defaults = {self.init};"]
+        whole = bool(self.payload.settable)
+        lines = [f"const {kind}_t defaults = {self.init};"] if whole else []
         lines += self._locals()
-        lines.append("*message = defaults;")
-        lines += self._all(numbers)
+        lines += ["*message = defaults;"] if whole else []
+        for each in self.payload.decided_by:
+            self.refuse(
+                checks.refused_when_received(each.number, f"parts->{naming.member(each.name)}"), "RANGE"
+            )
+        lines += [*self._flushed(), *self._all(numbers)]
         self.refuse(["size != 0U"], "LENGTH")
         return [*lines, *self._flushed()]
 
@@ -324,7 +326,7 @@ class WalkedDecoder(Decoder):
         inner, presence = self._flushed(), segment.presence
         if presence is None:
             return inner
-        test = "size > 0U" if presence.optional else condition(presence.when, numbers, _in_struct)
+        test = "size > 0U" if presence.optional else condition(presence.when, numbers, place_of(self.payload))
         member = has_member(segment)
         if not member:
             return _guarded(test, inner)

@@ -179,7 +179,8 @@ class Entries:
         address = "address, " if header.address else ""
         address += "&store.parts, " if self._plan.around(plan.direction).values else ""
         part = "request_sum, " if header.sum_bits and plan.direction == "response" else ""
-        decode = f"decode({store}" if framed else f"from_frame({store}{part}"
+        decided = "&store.parts, " if message.decided_by else ""
+        decode = f"decode({store}{decided}" if framed else f"from_frame({store}{part}"
         handled, called = self._has_handler(plan), self._has_callback(plan)
         ranges = sum(isinstance(row, Wrong) and row.kind == _RANGE for row in rows)
         right = [row for row in rows if isinstance(row, Right)]
@@ -276,7 +277,11 @@ def _events(events: tuple[str, ...] | None) -> str:
 
 @dataclass(frozen=True, slots=True)
 class CaseView:
-    """The function that tells whether a struct has a case of a choice."""
+    """The function that tells whether a struct has a case of a choice.
+
+    Attributes:
+        struct: its type, "" if a value of the frame tells.
+    """
 
     function: str
     struct: str
@@ -310,8 +315,10 @@ class MemberRows:
         for step in payload.settable:
             rows = self._member(struct, inside, step)
             if step.name in before and before[step.name].slot:
-                test = self._header.test(payload, before[step.name], inside)
-                case = CaseView(f"{self._stem}_case_{len(self.cases) + 1}", struct, test)
+                test = self._header.test(payload, before[step.name], inside, "store.parts.")
+                beside = before[step.name].choosing.value in {each.name for each in payload.decided_by}
+                name = f"{self._stem}_case_{len(self.cases) + 1}"
+                case = CaseView(name, "" if beside else struct, test)
                 self.cases.append(case)
                 lines.append(f"CASE({case.function}, {len(rows)}u),")
             elif step.name in before:

@@ -71,6 +71,7 @@ class Wrong:
 
 
 Row = Right | Wrong
+_NONE: Mapping[str, int] = {}
 
 
 def rows_of(plan: Plan, sources: Sources) -> dict[str, list[Row]]:
@@ -108,7 +109,9 @@ def _right(plan: Plan, header: Header, entry: JsonObject) -> Right:
         kinds=kinds,
         address=entry.get(record_key(plan.frame.address), message.default_address),
         values=_numbers(plan, header, beside)
-        + _values(header, message.values, planned.payload, entry["fields"], entry.get("raw", {})),
+        + _values(
+            header, message.values, planned.payload, entry["fields"], entry.get("raw", {}), beside=beside
+        ),
         payload=bytes.fromhex(entry["payload"]),
         wire=bytes.fromhex(entry["wire"]),
         request=bytes.fromhex(entry.get("request", "")),
@@ -246,11 +249,21 @@ def _item(header: Header, run: RunStep) -> int:
 
 
 def _values(
-    header: Header, stated: Sequence[Value], payload: PayloadPlan, fields: JsonObject, raw: JsonObject
+    header: Header,
+    stated: Sequence[Value],
+    payload: PayloadPlan,
+    fields: JsonObject,
+    raw: JsonObject,
+    *,
+    beside: Mapping[str, int] = _NONE,
 ) -> bytes:
-    """The values of a message or a record."""
+    """The values of a message in a frame with the values ``beside``, or of a record."""
     before, data = presences(payload.settable), b""
-    own = chosen(stated, lambda name: _number(stated, payload, name, fields, raw))
+    decided = payload.decided(beside)
+    own = chosen(
+        stated,
+        lambda name: decided[name] if name in decided else _number(stated, payload, name, fields, raw),
+    )
     for value, step in zip(stated, payload.settable, strict=True):
         if value.field.slot:
             sent = value in own and _native(value, fields) is not None

@@ -113,8 +113,11 @@ class Header(typing.Protocol):
         """The path of the struct member with the number of items of a run of variable size."""
         ...
 
-    def test(self, payload: PayloadPlan, presence: Presence, inside: str) -> str:
-        """The expression that is true if a struct has a field; ``inside`` precedes its members."""
+    def test(self, payload: PayloadPlan, presence: Presence, inside: str, parts: str) -> str:
+        """The expression that is true if a struct has a field; ``inside`` precedes its members.
+
+        ``parts`` precedes those of the values of its frame.
+        """
         ...
 
     def count_width(self, most: int) -> int:

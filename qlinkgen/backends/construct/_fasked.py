@@ -40,6 +40,7 @@ class Told(Construct):
         super().__init__()
         self.frame = frame
         self.wrap = frame.wrap
+        self.decided = frame.decided
         self.requests = requests
         self.asked = {each.request: each.answers for each in asked}
         others = {
@@ -65,7 +66,7 @@ class Told(Construct):
         data = self.frame.by_name[self.carrier].build(found.fields)
         for message in self.asked.get(self.requests.parse(request).message, ()):
             try:
-                fields = message.parse(data)
+                fields = message.parse(data, decided=self.frame.decided(message, found))
             except RangeError as error:
                 faults.append(FrameError("length", f"{message.name}; {error}"))
             except FrameError as error:

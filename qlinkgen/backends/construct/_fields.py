@@ -375,6 +375,14 @@ class TextField(BytesField):
         return obj
 
 
+def bits_of(field: Renamed, whole: int) -> int:
+    """The raw number of bits in an integer."""
+    inner = _innermost(field)
+    assert isinstance(inner, Bits)
+    value = whole >> inner.first & (1 << inner.bits) - 1
+    return int(_signed(value, inner.bits)) if inner.signed else value
+
+
 def _innermost(subcon: Construct) -> Construct:
     """What reads the bytes of a field."""
     while hasattr(subcon, "subcon"):
@@ -394,6 +402,10 @@ class Message(Construct):
     Missing fields are sent with their defaults. Values inside BitFields are on the same level as other
     values. Sizes are checked before values.
     """
+
+    #: Values of its frame that decide which fields it has, with their raw defaults. A frame passes their raw
+    #: numbers to parse and build, as ``decided``.
+    decided_by: Mapping[str, int] = {}
 
     def __init__(
         self,

@@ -7,7 +7,7 @@ Frames compute and check lengths, inserted bytes and check values.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import BinaryIO, NamedTuple
 
 from construct import (
@@ -20,7 +20,7 @@ from construct import (
     stream_write,
 )
 
-from ._fields import BitFields, Message, Values
+from ._fields import BitFields, Message, Values, bits_of
 
 
 class FrameError(ConstructError):
@@ -553,11 +553,30 @@ class Frame(Construct):
                 f"{message.name} cannot have {self.address} {address!r}",
                 path=path,
             )
-        payload = message.build(obj.get("fields") or {})
+        decided = self.decided(message, obj)
+        payload = message.build(obj.get("fields") or {}, decided=decided)
         request = context._params.get("request", b"")
         wire = self.wrap(message, payload, address, request, beside=obj)
         stream_write(stream, wire, len(wire), path)
         return obj
+
+    def decided(self, message: Message, beside: Values) -> dict[str, int]:
+        """The raw numbers of values of a frame that decide which fields its payload has."""
+        return self._deciding(message, lambda values: bytes(values.build(beside)))
+
+    def _deciding(
+        self, message: Message, cell: Callable[[BitFields], bytes]
+    ) -> dict[str, int]:
+        """These numbers in the bytes of the parts with them."""
+        found: dict[str, int] = {}
+        for part in self.parts:
+            values = part.values if isinstance(part, Cell) else None
+            for field in values.fields if values else ():
+                if values and field.name in message.decided_by:
+                    whole = int(values.integer.parse(cell(values)))
+                    field.parse(b"", bits=whole)  # the value is legal
+                    found[field.name] = bits_of(field, whole)
+        return found
 
     def _named(self, obj: Values, path: str) -> Message:
         """The message that values are of."""
@@ -642,7 +661,7 @@ class Frame(Construct):
         for check in self.checks:
             if _seeds(check):
                 self._compare(check, {**cells, **seeds}, request)
-        fields = _parsed(message, payload)
+        fields = _parsed(message, payload, self._received(message, cells))
         if not _allowed(message, address):
             raise FrameError(
                 "range", f"{message.name} cannot have {self.address} {address}"
@@ -658,6 +677,18 @@ class Frame(Construct):
             text = f"{name} of {message.name} is not {message.settled[name]}"
             raise FrameError("range", text)
         return Container(message=message.name, **place, fields=fields)
+
+    def _received(self, message: Message, cells: Mapping[str, bytes]) -> dict[str, int]:
+        """The numbers in a received frame that decide which fields its payload has."""
+        held = {
+            id(part.values): cells[part.name]
+            for part in self.parts
+            if isinstance(part, Cell) and part.values and part.name in cells
+        }
+        try:
+            return self._deciding(message, lambda values: held[id(values)])
+        except ConstructError as error:
+            raise FrameError("range", f"{message.name}; {error}") from None
 
     def _compare_blocks(self, cells: Mapping[str, bytes], payload: bytes) -> None:
         for blocks in self.parts:
@@ -677,10 +708,10 @@ def _unsettled(message: Message, values: Values) -> str:
     return next(wrong, "")
 
 
-def _parsed(message: Message, payload: bytes) -> Container:
-    """The fields of a payload."""
+def _parsed(message: Message, payload: bytes, decided: Mapping[str, int]) -> Container:
+    """The fields of a payload; ``decided`` are values of its frame."""
     try:
-        return message.parse(payload)
+        return message.parse(payload, decided=decided)
     except RangeError as error:
         text = f"invalid payload of {len(payload)} bytes; {error}"
         raise FrameError("length", text) from None

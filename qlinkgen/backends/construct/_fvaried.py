@@ -20,6 +20,8 @@ from construct import (
 from ._fields import BitFields, Count, Values
 from ._fwalks import Presence, Taken, Test, Walked, _values
 
+_NONE: Mapping[str, int] = {}
+
 
 class SizeOf(Count):
     """The bytes of the records or of the choice ``of``; ``more`` bytes are counted beside them.
@@ -139,16 +141,25 @@ class Varied(Walked):
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
         data = stream_read_entire(stream, path)
-        values, at, _ = self.read(data, 0, len(data), path)
+        decided = self._decided(context)
+        values, at, _ = self.read(data, 0, len(data), path, decided)
         if at != len(data):
             raise RangeError(f"{len(data) - at} bytes follow {self.name}", path=path)
         return values
 
     def read(
-        self, data: bytes, at: int, end: int, path: str
+        self,
+        data: bytes,
+        at: int,
+        end: int,
+        path: str,
+        decided: Mapping[str, int] = _NONE,
     ) -> tuple[Container, int, Mapping[str, int]]:
-        """The values at an offset, that of their end, and the raw numbers that tests need."""
-        found, limit, before = _Found(self.known), end, ""
+        """The values at an offset, that of their end, and the raw numbers that tests need.
+
+        ``decided`` are the raw values of the frame among these.
+        """
+        found, limit, before = _Found(self.known, decided), end, ""
         for segment in self._segments():
             if (slot := self._filling(segment[0])) != before:
                 _check_filled(before, at, limit, path)
@@ -314,7 +325,7 @@ class Varied(Walked):
 
     def _sent(self, slot: str, values: Container, path: str) -> Renamed | None:
         """The case of a choice that is sent."""
-        numbers: dict[str, int] = {}
+        numbers: dict[str, int] = dict(values._decided)
         for field in self.fields:
             bits = isinstance(field.subcon, BitFields)
             inner = field.subcon.fields if bits else [field]
@@ -368,11 +379,11 @@ class VariedRecord(Varied):
 class _Found:
     """What has been read of a message or record: values, bytes, and what later fields depend on."""
 
-    def __init__(self, known: Mapping[str, int]) -> None:
+    def __init__(self, known: Mapping[str, int], decided: Mapping[str, int]) -> None:
         self.values = Container()
         self.cells: dict[str, bytes] = {}
         self.counts = dict(known)
-        self.numbers: dict[str, int] = {}
+        self.numbers = dict(decided)
         self.sizes: dict[str, int] = {}
 
 

@@ -19,7 +19,6 @@ from construct import (
 
 from ._fields import (
     BitFields,
-    Bits,
     BytesField,
     Count,
     Groups,
@@ -28,7 +27,7 @@ from ._fields import (
     TextField,
     Values,
     _innermost,
-    _signed,
+    bits_of,
 )
 
 #: A test of an earlier value: its name, ranges of raw numbers, whether they are excluded.
@@ -104,9 +103,11 @@ class Walked(Message):
         presence: Sequence[Presence] = (),
         choices: Sequence[tuple[str, Sequence[str]]] = (),
         most: int = 0,
+        decided_by: Sequence[tuple[str, int]] = (),
         **settings: Any,  # those of a Message
     ) -> None:
         super().__init__(name, message_id, *fields, **settings)
+        self.decided_by = dict(decided_by)
         #: The value of which a field is a case.
         self.slots = {case: slot for slot, cases in choices for case in cases}
         self.presence = {field: tests for field, tests, _ in presence}
@@ -168,7 +169,7 @@ class Walked(Message):
             whole = _number(field.subcon.integer, cell)
             for inner in field.subcon.fields:
                 if inner.name in self.tested:
-                    numbers[inner.name] = _bits(inner, whole)
+                    numbers[inner.name] = bits_of(inner, whole)
         elif field.name in self.tested:
             numbers[field.name] = _number(field, cell)
 
@@ -181,6 +182,13 @@ class Walked(Message):
                 raise RangeError(
                     f"{field.name} does not agree with {field.subcon.of}", path=path
                 )
+
+    def _decided(self, context: Container) -> dict[str, int]:
+        """The raw values of the frame that conditions test."""
+        given = context.get("_params", {}).get("decided", {})
+        return {
+            name: given.get(name, number) for name, number in self.decided_by.items()
+        }
 
     def measured(self, take: Callable[[int], bytes]) -> bytes:
         """Read a payload with ``take``; its size follows from counts and tested values."""
@@ -217,7 +225,7 @@ class Walked(Message):
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
         data, at = stream_read_entire(stream, path), 0
-        counts, numbers = dict(self.known), dict[str, int]()
+        counts, numbers = dict(self.known), self._decided(context)
         values, cells = Container(), dict[str, bytes]()
         for segment in self._segments():
             left = len(data) - at
@@ -286,7 +294,8 @@ class Walked(Message):
     ) -> Values:
         values = self._initial(obj, path)
         values.update(obj)
-        numbers: dict[str, int] = {}
+        values._decided = self._decided(context)
+        numbers: dict[str, int] = dict(values._decided)
         left_out = False
         sent: set[str] = set()
         cells: dict[str, bytes] = {}
@@ -347,10 +356,3 @@ def _number(subcon: Construct, data: bytes) -> int:
     """The integer of wire bytes, without regard to what is legal."""
     inner = _innermost(subcon)
     return int(inner.number(data) if isinstance(inner, Groups) else inner.parse(data))
-
-
-def _bits(field: Renamed, whole: int) -> int:
-    inner = _innermost(field)
-    assert isinstance(inner, Bits)
-    value = whole >> inner.first & (1 << inner.bits) - 1
-    return int(_signed(value, inner.bits)) if inner.signed else value

@@ -11,6 +11,8 @@ from qlinkgen.backends.construct.tree import Value, evaluate
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import Options, plan_of
 
+_NONE: Mapping[str, Value] = {}
+
 
 class Live:
     """The definitions of a generated module, with methods for its use as a reference.
@@ -27,9 +29,14 @@ class Live:
         known = {"request": "REQUEST_FRAME", "response": "RESPONSE_FRAME", "message": "FRAME"}
         self.frames = {direction: names[name] for direction, name in known.items() if name in names}
 
-    def payload(self, message: str, fields: Mapping[str, Value]) -> bytes:
-        """The payload of a message, with defaults for missing fields."""
-        return bytes(self.messages[message].build(fields))
+    def payload(
+        self, message: str, fields: Mapping[str, Value], beside: Mapping[str, Value] = _NONE
+    ) -> bytes:
+        """The payload of a message, with defaults for missing fields and missing values of its frame."""
+        frame = next((each for each in self.frames.values() if message in each.by_name), None)
+        known = self.messages[message]
+        decided = frame.decided(known, beside) if known.decided_by and frame is not None else {}
+        return bytes(known.build(fields, decided=decided))
 
     def wrap(
         self, message: str, payload: bytes, address: int = 0, request: bytes = b"", number: int | None = None

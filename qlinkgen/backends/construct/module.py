@@ -135,6 +135,10 @@ def _walking(payload: PayloadPlan) -> dict[str, Node]:
     settings: dict[str, Node] = {"presence": Sequence(tuple(presence_of(payload)))}
     if payload.most < sum(map(full_size, payload.steps)):
         settings["most"] = payload.most
+    if payload.decided_by:
+        settings["decided_by"] = Sequence(
+            tuple((record_key(each.name), each.number.default) for each in payload.decided_by)
+        )
     if choices := tuple(choices_of(payload)):
         settings["choices"] = Sequence(choices)
     return settings

@@ -233,8 +233,15 @@ def presence_of(payload: PayloadPlan) -> Iterator[Node]:
     """The fields that may be absent, and what decides."""
     for segment in payload.segments:
         if presence := segment.presence:
-            tests: tuple[Node, ...] = tuple((each.value, each.ranges, each.negated) for each in presence.when)
+            tests: tuple[Node, ...] = tuple(
+                (tested_key(payload, each.value), each.ranges, each.negated) for each in presence.when
+            )
             yield presence.field, tests, presence.given
+
+
+def tested_key(payload: PayloadPlan, name: str) -> str:
+    """The name of a tested value: that of one of the frame is the one in a container of the frame."""
+    return record_key(name) if any(each.name == name for each in payload.decided_by) else name
 
 
 def choices_of(payload: PayloadPlan) -> Iterator[Node]:

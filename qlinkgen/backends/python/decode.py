@@ -192,7 +192,7 @@ class Decoder:
         match part:
             case AddressPart():
                 self._address(part, at)
-            case CellPart() if part.values or any(isinstance(slot, AddressSlot) for slot in part.slots):
+            case CellPart() if self._is_read(part):
                 self._cell(part, at)
             case LengthPart() if self.place.unique:
                 # The receiver relies on this comparison of length and size.
@@ -206,6 +206,14 @@ class Decoder:
                 raise AssertionError(f"{part.name} is not read by a message's class")
             case _:
                 assert_never(part)
+
+    def _is_read(self, part: CellPart) -> bool:
+        """Whether a part has an address or values, beside those that are read before the payload."""
+        before = self.message.payload.decided_by
+        return any(
+            isinstance(slot, AddressSlot) or (isinstance(slot, Member) and slot not in before)
+            for slot in part.slots
+        )
 
     def _address(self, part: AddressPart, at: Size) -> None:
         number = self._get(part.integer, f"{part.name}_part", at)
@@ -225,7 +233,7 @@ class Decoder:
                 self._values.append(f"{number} = {taken}")
                 self._values += self._address_check(part, number, _INDENT)
                 self._values.append(f"message.{self.place.address} = {number}")
-            elif isinstance(slot, Member):
+            elif isinstance(slot, Member) and slot not in self.message.payload.decided_by:
                 self.get_member(slot, taken, self._place_of(part), self.place.data)
 
     def _place_of(self, part: Part) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from qlinkgen.backends.python import integers
+from qlinkgen.backends.python import integers, pieces
 from qlinkgen.backends.python.decode import Decoder, assigned_targets, divided
 from qlinkgen.backends.python.encode import Encoder, Row
 from qlinkgen.backends.python.layout import indented, literal
@@ -196,8 +196,9 @@ class WalkedDecoder(Decoder):
     def statements(self) -> list[str]:
         """Lines of the function body."""
         place = self.place
+        decided = self._decided()
         unpacked, header = self._front()
-        lines = ["message = _new(cls)", *unpacked]
+        lines = ["message = _new(cls)", *decided, *unpacked]
         end = f"len({place.data}) - {place.trailer}" if place.trailer else f"len({place.data})"
         lines += [f"at = {place.header}", f"end = {end}"]
         self._walking = True
@@ -209,6 +210,17 @@ class WalkedDecoder(Decoder):
             self._part(part, at)
             at += part.size
         return [*lines, *header, *self._flushed(), *self._absent(), "return message"]
+
+    def _decided(self) -> list[str]:
+        """Statements that check and assign the values of the frame that conditions test."""
+        place, envelope = self.place, self.place.envelope
+        for part, member in envelope.values if envelope else ():
+            if envelope and member in self.message.payload.decided_by:
+                seen = pieces.read(envelope, part, place.data, skipped=place.skipped)
+                taken = integers.bits_of(part.integer, seen, member.shift, member.bits)
+                self.get_member(member, taken, self._place_of(part), place.data)
+        lines, self._values = self._values, []
+        return lines
 
     def _front(self) -> tuple[list[str], list[str]]:
         """Statements that unpack the header, and those that check and assign its values, which come last."""

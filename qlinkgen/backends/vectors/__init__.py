@@ -66,20 +66,23 @@ class _Vectors:
 
     def _example(self, message: MessagePlan, example: Example) -> Good:
         found = self._codec.decode_as(message, example.wire, example.after)
-        payload = pack(message.payload, found.values)
         values, beside = dict(found.values), dict(found.beside)
+        payload = pack(message.payload, {**values, **beside})
         return Good(message, found.address, values, beside, payload, example.wire, example.after)
 
     def _one(self, message: MessagePlan, kind: str) -> Good:
         chance = Chance(f"{self._protocol.name} {message.name} {kind}")
-        values = _values(message, kind, chance)
+        decided = bool(message.payload.decided_by)
+        beside = _beside(message, kind, chance) if decided else {}
+        values = _values(message, kind, chance, beside)
         address = _address(message, kind, chance)
-        beside = _beside(message, kind, chance)
+        beside = beside if decided else _beside(message, kind, chance)
         request = self._request(message, kind)
         wire = self._codec.encode(message.name, {**values, **beside}, address, request)
         if message.asked:
             request = self._asking(message, kind, wire)
-        return Good(message, address, values, beside, pack(message.payload, values), wire, request)
+        payload = pack(message.payload, {**values, **beside})
+        return Good(message, address, values, beside, payload, wire, request)
 
     def _request(self, message: MessagePlan, kind: str) -> bytes:
         """The request of a response, b"" if its frame does not depend on it."""
@@ -147,7 +150,7 @@ def _shown(good: Good) -> Mapping[str, Json]:
     fields: dict[str, Json] = {}
     raw: dict[str, Json] = {}
     pairs = dict(zip(good.message.message.values, good.message.payload.settable, strict=True))
-    for value in chosen(pairs, good.values.get):
+    for value in chosen(pairs, {**good.beside, **good.values}.get):
         step, number = pairs[value], good.values[value.name]
         shown = fields[value.name] = to_json(value, native_of(step, number))
         if isinstance(step, RecordStep | RecordsStep):
@@ -200,10 +203,11 @@ def _numbers_of(plan: PayloadPlan, raw: Mapping[str, Raw]) -> Json:
     return found
 
 
-def _values(message: MessagePlan, kind: str, chance: Chance) -> dict[str, Raw]:
+def _values(message: MessagePlan, kind: str, chance: Chance, beside: Mapping[str, Raw]) -> dict[str, Raw]:
+    """The values of a payload in a frame with the values ``beside``."""
     if kind == "defaults":
         return choice.defaults(message.payload)
-    return (_RULES.get(kind) or choice.random(chance)).values(message.payload)
+    return (_RULES.get(kind) or choice.random(chance)).values(message.payload, beside)
 
 
 def _beside(message: MessagePlan, kind: str, chance: Chance) -> dict[str, Raw]:

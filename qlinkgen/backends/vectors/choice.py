@@ -57,6 +57,7 @@ class Chance:
 
 
 _MASK = (1 << 64) - 1
+_NONE: Mapping[str, Raw] = {}
 
 
 def _without(barred: bytes) -> bytes | None:
@@ -83,9 +84,9 @@ class Rule:
         self._octet = octet
         self._pattern = pattern
 
-    def values(self, plan: PayloadPlan) -> dict[str, Raw]:
-        """The raw values of a payload."""
-        found: dict[str, Raw] = {}
+    def values(self, plan: PayloadPlan, beside: Mapping[str, Raw] = _NONE) -> dict[str, Raw]:
+        """The raw values of a payload in a frame with the values ``beside``."""
+        found: dict[str, Raw] = {**plan.decided(beside)}
         sent = True
         for step in plan.steps:
             if step.presence is not None:
@@ -213,7 +214,7 @@ def _is_too_long(plan: PayloadPlan, values: Mapping[str, Raw]) -> bool:
     if not any(segment.records for segment in plan.segments):
         return False
     try:
-        pack(plan, by_value(plan, values))
+        pack(plan, {**plan.decided(values), **by_value(plan, values)})
     except Unsendable:
         return True
     return False

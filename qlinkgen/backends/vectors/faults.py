@@ -296,7 +296,9 @@ class _Frame:
         plan, length = self._message.payload, self._envelope.length
         payload = plan.filled(self._good.payload)
         # Of a list between separators the first item.
-        firsts = {step.name: (step, at) for step, at in reversed(list(places(plan, payload)))}
+        firsts = {
+            step.name: (step, at) for step, at in reversed(list(places(plan, payload, self._good.beside)))
+        }
         for step, at in reversed(firsts.values()):
             for name, number, data in _spoilt(step, payload[at:]):
                 yield f"{name} is {number}", payload[:at] + data + payload[at + len(data) :]
@@ -313,7 +315,8 @@ class _Frame:
         plan, address = self._message.payload, self._good.address or 0
         match self._transparency:
             case FrameStuffing(rule):
-                cells = self._made(pack(plan, filled(rule.after).values(plan)))
+                beside = self._good.beside
+                cells = self._made(pack(plan, {**filled(rule.after).values(plan, beside), **beside}))
                 wire = self._joined(cells)
                 for at in _lone(rule, wire, self._inserted(wire)):
                     for what, data in _damaged(rule, wire, at):
