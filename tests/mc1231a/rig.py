@@ -20,13 +20,14 @@ from qlinkgen.protocols.mc1231a import AsyncAxis, AsyncHost, ChipEngine, ChipSet
 from qlinkgen.sim import VirtualPort, Wire
 from qlinkgen.sim.chip_bus import chip_wire
 from qlinkgen.sim.pty_bus import PtyBus
-from qlinkgen.transport import Port, open_port
+from qlinkgen.transport import Port
 from tests.support.memory_line import MemoryLine
 from tests.support.needs import decided_by_parameter
+from tests.support.pty_line import PtyLine
 
 BAUD = 115200
-#: Seconds of host slack; in real time what a busy machine needs.
-SLACK = {"virtual": 0.002, "memory": 0.3, "pty": 0.3}
+#: Seconds of host slack; in real time, which skips silence, longer than a thread waits on a busy machine.
+SLACK = {"virtual": 0.002, "memory": 5.0, "pty": 5.0}
 #: Seconds after which something that must happen has not happened.
 PATIENCE = 20.0
 
@@ -181,16 +182,25 @@ def _by_line(line: PtyBus) -> Callable[[Callable[[], Any]], Any]:
     return do
 
 
+@dataclass(frozen=True)
+class _Place:
+    """A port, how to do something in the thread of its line, and what makes an event loop."""
+
+    port: Port
+    do: Callable[[Callable[[], Any]], Any]
+    loop_factory: Callable[[], asyncio.AbstractEventLoop] = asyncio.new_event_loop
+
+
 @contextlib.contextmanager
-def _line(setting: Setting, wire: Wire) -> Iterator[tuple[Port, Callable[[Callable[[], Any]], Any]]]:
+def _line(setting: Setting, wire: Wire) -> Iterator[_Place]:
     if setting.transport == "virtual":
-        yield VirtualPort(wire), lambda action: action()
+        yield _Place(VirtualPort(wire), lambda action: action())
     elif setting.transport == "pty":
-        with PtyBus(wire) as line, open_port(line.path) as port:
-            yield port, _by_line(line)
+        with PtyLine(wire) as line:
+            yield _Place(line.port, _by_line(line.bus), line.loop_factory)
     else:
         with MemoryLine(wire, BAUD) as port:
-            yield port, port.do
+            yield _Place(port, port.do)
 
 
 @decided_by_parameter
@@ -203,17 +213,17 @@ def make_rig(
     wire = chip_wire(engine, baud=BAUD if setting.transport == "virtual" else None)
     options.setdefault("slack", SLACK[setting.transport])
     with contextlib.ExitStack() as stack:
-        inner, do = stack.enter_context(_line(setting, wire))
-        port = Breaking(inner)
+        place = stack.enter_context(_line(setting, wire))
+        port = Breaking(place.port)
         if setting.client == "blocking":
             host = stack.enter_context(Host(port, **options))
         else:
-            loop = asyncio.new_event_loop()
+            loop = place.loop_factory()
             stack.callback(loop.close)
             client = AsyncHost(port, **options)
             stack.callback(client.close)
             host = cast(Host, AsBlocking(client, loop))
-        yield Rig(host, port, engine, do)
+        yield Rig(host, port, engine, place.do)
 
 
 def virtual(**options: Any) -> contextlib.AbstractContextManager[Rig]:

@@ -20,17 +20,18 @@ from qlinkgen.link import EchoMode, Event, SlaveEngine
 from qlinkgen.protocols.qlink import AsyncBus, Bus, VirtualNode
 from qlinkgen.sim import Echo, FaultPlan, VirtualPort, Wire
 from qlinkgen.sim.fault_kinds import RateLike
-from qlinkgen.sim.pty_bus import PtyBus
-from qlinkgen.transport import Port, open_port
+from qlinkgen.transport import Port
 from tests.firmware.firmware import TARGETS
 from tests.firmware.node import FirmwareNode, RealPauses
 from tests.qlink.behaviour_drivers import AsBlocking
 from tests.support.memory_line import MemoryLine
 from tests.support.needs import decided_by_parameter
+from tests.support.pty_line import PtyLine
 
 T = TypeVar("T")
-#: Seconds of host slack: more than the longest answer takes; in real time what a busy machine needs.
-SLACK = {"virtual": 0.012, "memory": 0.3, "pty": 0.3}
+#: Seconds of host slack: more than the longest answer takes. In real time, which skips silence, longer than a
+#: busy machine keeps a thread waiting.
+SLACK = {"virtual": 0.012, "memory": 5.0, "pty": 5.0}
 #: An answer so late misses its deadline, and still comes while the line has to be quiet.
 LATE = (0.018, 0.024)
 HIGH = 0.15
@@ -268,12 +269,12 @@ def make_rig(setting: Setting, *nodes: Node, turnaround: float = 0.0, **options:
             wire.attach(SlaveEngine(qlink, node, turnaround=turnaround))
     given = {"echo": setting.echo, "health": None, "slack": SLACK[setting.transport], **options}
     with contextlib.ExitStack() as stack:
-        port = stack.enter_context(_port(setting, wire))
+        port, loop_factory = stack.enter_context(_port(setting, wire))
         bus: Bus
         if setting.client == "blocking":
             bus = stack.enter_context(Bus(port, **given))
         else:
-            runner = stack.enter_context(asyncio.Runner())
+            runner = stack.enter_context(asyncio.Runner(loop_factory=loop_factory))
             loop = runner.get_loop()
             client = AsyncBus(port, **given)
             stack.callback(client.close)
@@ -282,17 +283,21 @@ def make_rig(setting: Setting, *nodes: Node, turnaround: float = 0.0, **options:
         yield Rig(setting, cast(tuple[Probe, ...], nodes), bus, wire)
 
 
+#: Makes an event loop; None for the usual one.
+LoopFactory = Callable[[], asyncio.AbstractEventLoop] | None
+
+
 @contextlib.contextmanager
-def _port(setting: Setting, wire: Wire) -> Iterator[Port]:
+def _port(setting: Setting, wire: Wire) -> Iterator[tuple[Port, LoopFactory]]:
     if setting.transport == "virtual":
         clock = RealPauses if setting.firmware else VirtualPort
-        yield clock(wire, reaction=(0.0, 0.0003))
+        yield clock(wire, reaction=(0.0, 0.0003)), None
     elif setting.transport == "pty":
-        with PtyBus(wire) as line, open_port(line.path) as port:
-            yield port
+        with PtyLine(wire) as line:
+            yield line.port, line.loop_factory
     else:
         with MemoryLine(wire) as port:
-            yield port
+            yield port, None
 
 
 def _stray(chance: random.Random) -> bytes:
