@@ -32,7 +32,7 @@ NAMES = {
 #: Words of prose.
 PROSE = {
     "any number of tasks of one event loop": "any number of threads",
-    "asyncio program": "program",
+    "thread or task": "thread",
 }
 #: What the docstring of a derived module says.
 _DERIVED = "Derived from `aio.py` by `python -m tests.unasync`: change that one, and run it."
@@ -88,6 +88,11 @@ PAIRS = (
             "await bus.node(3).motor_position()": "bus.node(3).motor_position().position",
             "AsyncGenerator[MotionProgress, None]": "Generator[MotionProgress, None, dict[int, int]]",
         },
+    ),
+    Pair(
+        "qlinkgen/protocols/mc1231a/aio.py",
+        "qlinkgen/protocols/mc1231a/host.py",
+        {" for asyncio; `qlinkgen.protocols.mc1231a.host` is derived from it.": f".\n\n{_DERIVED}\n"},
     ),
 )
 

@@ -125,4 +125,5 @@ class Watched(MasterDriver):
             for event in self.engine.events:
                 log_event(self.logger, event)
         super()._report()
-        tell_frames(self.engine, self.on_frame)
+        if self.on_frame is not None:
+            tell_frames(self.engine, self.on_frame)

@@ -99,12 +99,12 @@ class BlockingMaster(MasterDriver):
         if stream is not None and stream.error is not None:
             raise stream.error
 
-    def transaction(self) -> AbstractContextManager[None]:
+    def transaction(self) -> AbstractContextManager[object]:
         """Keep the other threads off the line during a block of several calls.
 
         Blocks may be nested. The answers of a stream, and the requests of the other side of a link, wait too.
         """
-        return self._hold()
+        return self._lock
 
     @contextmanager
     def _hold(self) -> Iterator[None]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.transport.blocking import BlockingMaster
@@ -25,6 +25,10 @@ class BlockingPeer(BlockingMaster):
         """Send a request; see `BlockingMaster.transact`."""
         with self._turn():
             return super().transact(request, attempts=attempts, trial=trial)
+
+    def transaction(self) -> AbstractContextManager[object]:
+        """Keep the other threads off the line; see `BlockingMaster.transaction`."""
+        return self._turn()
 
     @contextmanager
     def _hold(self) -> Iterator[None]:

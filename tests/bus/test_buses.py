@@ -13,9 +13,10 @@ from typing import Any
 
 import pytest
 
-from qlinkgen.errors import NoReply, Refused
+from qlinkgen.errors import NoReply, PortLost, Refused
 from qlinkgen.link import Refusal
 from qlinkgen.link.events import Frame, Sent
+from qlinkgen.protocols.mc1231a import Host
 from qlinkgen.pytest_plugin import BusPairs, bus_pair
 from qlinkgen.sim import FaultPlan
 from qlinkgen.transport import memory_pair, open_pty
@@ -213,6 +214,44 @@ def test_serve_opens_the_port_itself() -> None:
             assert read(bus.node(NODE), 7).registers == [7]
             stopped.set()
             served.join()
+
+
+def test_a_slave_answers_in_an_event_loop() -> None:
+    near, far = memory_pair()
+
+    async def run() -> Any:
+        with modbus.Slave(far, Registers()) as slave:
+            serving = asyncio.create_task(slave.run_async())
+            answer = await read(modbus.AsyncBus(near, slack=5.0).node(NODE), 6)
+            serving.cancel()
+            await asyncio.wait([serving])
+            assert serving.cancelled()
+        return answer.registers
+
+    assert asyncio.run(run()) == [6]
+
+
+def test_a_port_that_is_lost_ends_a_running_slave() -> None:
+    near, far = memory_pair()
+    with pytest.raises(PortLost), modbus.Slave(far, Registers()).running():
+        near.close()
+
+
+@pytest.mark.pty
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda name: modbus.Bus.open(name, attempts=0),
+        modbus.Slave.open,
+        lambda name: Host.open(name, baud=57600, attempts=0),
+    ],
+    ids=["bus", "slave", "host"],
+)
+def test_a_port_is_closed_again_if_its_user_cannot_be_made(make: Callable[[str], object]) -> None:
+    with open_pty() as port:
+        for _ in range(2):  # an open port would be in use
+            with pytest.raises(ValueError, match=r"attempts|handlers"):
+                make(port.path)
 
 
 @pytest.mark.pty

@@ -1,4 +1,4 @@
-"""The asyncio host of a chip set: the same methods as coroutines."""
+"""The host of a chip set for asyncio; `qlinkgen.protocols.mc1231a.host` is derived from it."""
 
 from __future__ import annotations
 
@@ -13,14 +13,19 @@ from qlinkgen.protocols.mc1231a import updating
 from qlinkgen.protocols.mc1231a.facts import SELECT, check_axis
 from qlinkgen.protocols.mc1231a.usage import Checksum, Usage, make_engine, packet
 from qlinkgen.transport.aio import AsyncMaster
-from qlinkgen.transport.opening import open_port
+from qlinkgen.transport.opening import closing_on_error, open_port
 from qlinkgen.transport.port import Port
 
 R = TypeVar("R", bound=mc1231a.Message)
 
 
 class AsyncHost(AsyncMaster, AsyncHostCalls):
-    """The host of a chip set, for any number of tasks of one event loop. Otherwise like `Host`.
+    """The host of a chip set, for any number of tasks of one event loop.
+
+    Every command of the table is a method; those that act on the current axis take the axis as their first
+    argument, and are methods of `axis(n)` without it. The host tracks the current axis: set_1 or set_2 is
+    sent only if needed. Methods return the response and raise LinkError (NoReply, BadReply, IllegalCommand),
+    PortLost, or, before anything is sent, the EncodeError of `qlinkgen.codecs.mc1231a`.
 
     Example:
         >>> async with AsyncHost.open("/dev/ttyUSB0", baud=57600) as host:  # doctest: +SKIP
@@ -44,7 +49,21 @@ class AsyncHost(AsyncMaster, AsyncHostCalls):
         slack: float | None = None,
         on_event: Callable[[Event], None] | None = None,
     ) -> None:
-        """Take ownership of a port; arguments as for `Host`."""
+        """Take ownership of a port; closing the host closes it.
+
+        Args:
+            port: the port of the chip set.
+            checksum: commands whose checksum is read: "always", "never", or names. Without it, the loss or
+                corruption of a packet is not detected.
+            attempts: most transmissions of a packet, the first included; packets that are unsafe to repeat
+                are sent once.
+            command_errors: update and multi_update also read the status word, and raise CommandError.
+            forgets: seconds of silence after which the chip's side of the link discards an incomplete packet;
+                0 if it never does.
+            slack: largest delay in seconds that driver, adapter and operating system add to a transaction; by
+                default derived from the port.
+            on_event: called with each event, in the calling thread or task.
+        """
         engine = make_engine(port, checksum=checksum, attempts=attempts, slack=slack, forgets=forgets)
         super().__init__(engine, port, on_event=on_event)
         self.command_errors = command_errors
@@ -69,15 +88,16 @@ class AsyncHost(AsyncMaster, AsyncHostCalls):
             PortMissing: the port does not exist.
             PortBusy: another program uses it, or this user lacks the permission.
         """
-        return cls(
-            open_port(name, baud=baud),
-            checksum=checksum,
-            attempts=attempts,
-            command_errors=command_errors,
-            forgets=forgets,
-            slack=slack,
-            on_event=on_event,
-        )
+        with closing_on_error(open_port(name, baud=baud)) as port:
+            return cls(
+                port,
+                checksum=checksum,
+                attempts=attempts,
+                command_errors=command_errors,
+                forgets=forgets,
+                slack=slack,
+                on_event=on_event,
+            )
 
     def axis(self, number: int) -> AsyncAxis:
         """Return one axis, 1 or 2."""
@@ -92,19 +112,35 @@ class AsyncHost(AsyncMaster, AsyncHostCalls):
         """Send a packet, for an axis if one is given, and return its answer."""
         self.usage.note(request)
         context = None if axis is None else SELECT[check_axis(axis)]
-        answer: R = (await self.transact(packet(request, context))).response
+        reply = await self.transact(packet(request, context))
+        answer: R = reply.response
         return answer
 
     async def raise_command_error(self, axis: int) -> int:
-        """As `Host.raise_command_error`."""
+        """Read the status word of an axis and return it.
+
+        Raises:
+            CommandError: its command error bit is set.
+        """
         return await self.run(updating.raise_command_error(axis))
 
     async def update(self, axis: int, *, check: bool | None = None) -> mc1231a.UpdateResponse:
-        """As `Host.update`."""
+        """Activate all buffered values of an axis.
+
+        Args:
+            axis: 1 or 2.
+            check: then read the status word, and raise CommandError on a command error, of this update or an
+                earlier one; None: the default of the host.
+        """
         return await self.run(updating.update(axis, check=self.command_errors if check is None else check))
 
     async def multi_update(self, *, axes: int = 0, check: bool | None = None) -> mc1231a.MultiUpdateResponse:
-        """As `Host.multi_update`."""
+        """Update several axes simultaneously; the mask is inferred from the sources, not confirmed.
+
+        Args:
+            axes: masks of Axes; bit 0 is axis 1.
+            check: as for `update`, of each of these axes.
+        """
         return await self.run(
             updating.multi_update(axes, check=self.command_errors if check is None else check)
         )
@@ -126,13 +162,14 @@ class AsyncAxis(AsyncAxisCalls):
     async def ask(self, request: mc1231a.Message, response: type[R]) -> R:  # noqa: ARG002  # for type checkers
         """Send a packet for this axis and return its answer."""
         self.host.usage.note(request)
-        answer: R = (await self.host.transact(packet(request, self._context))).response
+        reply = await self.host.transact(packet(request, self._context))
+        answer: R = reply.response
         return answer
 
     async def raise_command_error(self) -> int:
-        """As `Host.raise_command_error`."""
+        """As `AsyncHost.raise_command_error`."""
         return await self.host.raise_command_error(self.number)
 
     async def update(self, *, check: bool | None = None) -> mc1231a.UpdateResponse:
-        """As `Host.update`."""
+        """As `AsyncHost.update`."""
         return await self.host.update(self.number, check=check)

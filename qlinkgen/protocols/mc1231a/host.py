@@ -1,4 +1,7 @@
-"""The blocking host of a chip set."""
+"""The host of a chip set.
+
+Derived from `aio.py` by `python -m tests.unasync`: change that one, and run it.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from qlinkgen.protocols.mc1231a import updating
 from qlinkgen.protocols.mc1231a.facts import SELECT, check_axis
 from qlinkgen.protocols.mc1231a.usage import Checksum, Usage, make_engine, packet
 from qlinkgen.transport.blocking import BlockingMaster
-from qlinkgen.transport.opening import open_port
+from qlinkgen.transport.opening import closing_on_error, open_port
 from qlinkgen.transport.port import Port
 
 R = TypeVar("R", bound=mc1231a.Message)
@@ -56,8 +59,7 @@ class Host(BlockingMaster, HostCalls):
             checksum: commands whose checksum is read: "always", "never", or names. Without it, the loss or
                 corruption of a packet is not detected.
             attempts: most transmissions of a packet, the first included; packets that are unsafe to repeat
-                are
-                sent once.
+                are sent once.
             command_errors: update and multi_update also read the status word, and raise CommandError.
             forgets: seconds of silence after which the chip's side of the link discards an incomplete packet;
                 0 if it never does.
@@ -89,15 +91,16 @@ class Host(BlockingMaster, HostCalls):
             PortMissing: the port does not exist.
             PortBusy: another program uses it, or this user lacks the permission.
         """
-        return cls(
-            open_port(name, baud=baud),
-            checksum=checksum,
-            attempts=attempts,
-            command_errors=command_errors,
-            forgets=forgets,
-            slack=slack,
-            on_event=on_event,
-        )
+        with closing_on_error(open_port(name, baud=baud)) as port:
+            return cls(
+                port,
+                checksum=checksum,
+                attempts=attempts,
+                command_errors=command_errors,
+                forgets=forgets,
+                slack=slack,
+                on_event=on_event,
+            )
 
     def axis(self, number: int) -> Axis:
         """Return one axis, 1 or 2."""
@@ -112,7 +115,8 @@ class Host(BlockingMaster, HostCalls):
         """Send a packet, for an axis if one is given, and return its answer."""
         self.usage.note(request)
         context = None if axis is None else SELECT[check_axis(axis)]
-        answer: R = self.transact(packet(request, context)).response
+        reply = self.transact(packet(request, context))
+        answer: R = reply.response
         return answer
 
     def raise_command_error(self, axis: int) -> int:
@@ -159,7 +163,8 @@ class Axis(AxisCalls):
     def ask(self, request: mc1231a.Message, response: type[R]) -> R:  # noqa: ARG002  # for type checkers
         """Send a packet for this axis and return its answer."""
         self.host.usage.note(request)
-        answer: R = self.host.transact(packet(request, self._context)).response
+        reply = self.host.transact(packet(request, self._context))
+        answer: R = reply.response
         return answer
 
     def raise_command_error(self) -> int:
