@@ -19,7 +19,7 @@ from qlinkgen.schema.kinds import Label
 from qlinkgen.schema.layouts import fields_of, fields_path
 from qlinkgen.schema.many import ManyBuilder
 from qlinkgen.schema.messages import Written
-from qlinkgen.schema.notation import AnswerId, Duration, StatedId, shown
+from qlinkgen.schema.notation import AnswerId, Divider, Duration, StatedId, shown
 from qlinkgen.schema.replies import ReplyBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.seeds import is_number
@@ -281,11 +281,21 @@ class CommandBuilder:
             number_path,
             fields or {},
             fields_path(given, place),
-            separator=spec.separator,
+            separator=self._separator(spec),
             kind=self._answer_kind(spec),
             inherited=number.relative,
         )
         return given if isinstance(given, str) else fields, written
+
+    def _separator(self, spec: CommandSpec) -> Divider | None:
+        """The separator of a response: the nearest that is stated; None for that of the defaults."""
+        own, common = spec.response, self._file.defaults.response
+        stated = (
+            own.separator if isinstance(own, AnswerSpec) else None,
+            spec.separator,
+            common.separator if isinstance(common, AnswerSpec) else None,
+        )
+        return next((each for each in stated if each is not None), None)
 
     def _answer_kind(self, spec: CommandSpec) -> str | None:
         """The kind of frame of a response: the nearest that is stated."""

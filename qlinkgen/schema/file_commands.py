@@ -93,6 +93,9 @@ class AnswerSpec(FileMapping):
 
     frame: Name | None = Field(default=None, description="Kind of its frame, if there are several")
     id: AnswerNumber | None = Field(default=None, description="Its number, if it is not that of the request")
+    separator: Separator | None = Field(
+        default=None, description="Character between its fields, if it is not that of the command; none: none"
+    )
     fields: Fields | None = Field(default=None, description="Its fields, in wire order")
     means: Annotated[MeansSpec, ShortForm("default", "string")] | None = Field(
         default=None, description="What it means, if one of its fields may refuse the request"
