@@ -388,7 +388,7 @@ class Blob:
     default: bytes = b""
     #: The byte that fills it up to its constant size; not part of the value. b"": it is not filled up.
     pad: bytes = b""
-    #: Characters that a text between separators, or before a terminator, does not have.
+    #: Characters that a text between separators, or before a terminator or the end of a frame, does not have.
     excluded: bytes = b""
     #: The character that follows it; not part of the value. b"": its size is told otherwise.
     terminator: bytes = b""

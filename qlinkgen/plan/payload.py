@@ -258,7 +258,7 @@ class BytesStep:
     default: bytes
     #: The byte that fills up a shorter value, which does not end with it; b"" if there is none.
     pad: bytes
-    #: Characters that a text between separators, or before a terminator, does not have.
+    #: Characters that a text between separators, or before a terminator or the end of a frame, does not have.
     excluded: bytes
     #: The character that follows it; b"" if there is none.
     terminator: bytes
@@ -281,6 +281,11 @@ class BytesStep:
     def least(self) -> int:
         """Minimum number of bytes of the value."""
         return 0 if self.pad else self.length.minimum
+
+    @property
+    def barred(self) -> bytes:
+        """Characters that it does not have, other than the one that ends it."""
+        return bytes(each for each in self.excluded if each not in self.terminator)
 
     def padded(self, value: bytes) -> bytes:
         """The bytes on the wire of a value."""

@@ -12,6 +12,7 @@ from qlinkgen.schema.fields import FieldBuilder
 from qlinkgen.schema.file_commands import AnswerSpec
 from qlinkgen.schema.file_fields import FieldSpec
 from qlinkgen.schema.file_model import SchemaFile
+from qlinkgen.schema.part_texts import fields_without_end
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.terminators import bytes_in
@@ -59,6 +60,7 @@ class AskedBuilder:
         least = min(0 if each.empty_is_default else each.min_size for each in answers)
         most = max(each.max_size for each in answers)
         fields = self._fields.build({"data": self._data(answers, least, most)} if most else {}, path)
+        fields = fields_without_end(fields, self._frame, path, self._report)
         return Message(
             name=CARRIER,
             command=CARRIER,

@@ -21,6 +21,7 @@ from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.frame_values import FrameValues, frame_values
 from qlinkgen.schema.notation import Divider, StatedId
+from qlinkgen.schema.part_texts import fields_without_end
 from qlinkgen.schema.pieces import IdBuilder
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.seeds import SeedBuilder
@@ -192,7 +193,7 @@ class MessageBuilder:
         )
         separator = self._separator(layout).byte
         if not separator:
-            return fields
+            return fields_without_end(fields, self._frame, layout.path, self._report)
         for name in layout.asked:
             what = f"the size of {name} follows from the separator after it"
             self._report.error("bad-separator", (*layout.path, name), what, "write its range", of_key=True)

@@ -149,7 +149,8 @@ class Decoder(Learner):
                 prefix = self.layouts.prefix
                 self.lines.append(f"{prefix}_copy_({target}, {place}, {count});")
                 if step.text:
-                    self.refuse([f"!{prefix}_is_text_({target}, {count})"], "RANGE")
+                    barred = [self.layouts.has_octet(target, count, each) for each in step.barred]
+                    self.refuse([f"!{prefix}_is_text_({target}, {count})", *barred], "RANGE")
             case ItemsStep():
                 count = self._number_of(step)
                 outer, self.lines = self.lines, []

@@ -105,8 +105,9 @@ class Encoder:
 
     def _check_octets(self, step: BytesStep) -> None:
         octets, count = f"message->{member_of(step)}", self._number_of(step)
-        if step.terminator:
-            self._refuse([self.layouts.has_octet(octets, count, step.terminator[0])], "RANGE")
+        if step.excluded:
+            barred = [self.layouts.has_octet(octets, count, each) for each in step.excluded]
+            self._refuse(barred, "RANGE")
         if step.text:
             self._refuse([f"!{self.layouts.prefix}_is_text_({octets}, {count})"], "RANGE")
 

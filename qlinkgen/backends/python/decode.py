@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from qlinkgen.backends.python import filled, floats, integers, pieces, values
-from qlinkgen.backends.python.layout import WIDTH, indented, literal, slice_of, wrapped
+from qlinkgen.backends.python.layout import WIDTH, in_hex, indented, literal, slice_of, wrapped
 from qlinkgen.backends.python.names import held
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
@@ -586,7 +586,9 @@ class Decoder:
             value = raw if step.text else target
             self._values.append(f"{value} = {raw}.rstrip({literal(step.pad)})")
         if step.text:
-            self._refuse(f"not {raw}.isascii()", value_name(step), raw, self._offset(step))
+            barred = [f"{in_hex(each)} in {raw}" for each in step.barred]
+            wrong = " or ".join([f"not {raw}.isascii()", *barred])
+            self._refuse(wrong, value_name(step), raw, self._offset(step))
             self._values.append(f'{target} = {raw}.decode("ascii")')
 
     def _slice(self, step: RunStep, target: str) -> None:

@@ -159,6 +159,7 @@ class Encoder:
         source = source_of(run)
         value = f'{source}.encode("ascii")' if run.text else f"{self.place.use('as_bytes')}({source})"
         self._lines.append(f"{run.name}_raw = {value}")
+        self._terms += [f"{in_hex(each)} not in {run.name}_raw" for each in run.barred]
         return f"{run.name}_raw"
 
     # Parts of the frame

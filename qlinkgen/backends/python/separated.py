@@ -60,7 +60,6 @@ class SeparatedEncoder(WalkedEncoder):
                 raw = self._octets(step)
                 least, most = characters(step)
                 self._terms.append(integers.holds(Within(least, most), f"len({raw})"))
-                self._terms += [f"{in_hex(each)} not in {raw}" for each in step.excluded]
                 text = raw
             case ValueStep():
                 raw = f"{step.name}_raw"

@@ -85,11 +85,21 @@ def encode(message: Message, values: Mapping[str, Raw]) -> bytes:
     if message.separator:
         return _texts(message, values)
     data = _fields(message.slots, values)
+    _check_barred(message, values)
     if len(data) > message.sizes[1]:
         raise Wrong("range", "too long")
     while message.trim is not None and len(data) > message.trim and data[-1] == 0:
         data = data[:-1]
     return data
+
+
+def _check_barred(message: Message, values: Mapping[str, Raw]) -> None:
+    """Check that no text has a byte that ends the frame. Raises Wrong."""
+    for slot in message.slots:
+        text = values.get(slot.name)
+        plain = isinstance(slot.kind, Run) and slot.kind.text and not slot.kind.item and not slot.kind.pad
+        if plain and isinstance(text, bytes) and any(each in message.barred for each in text):
+            raise Wrong("range", slot.name)
 
 
 def _texts(message: Message, values: Mapping[str, Raw]) -> bytes:
@@ -379,6 +389,7 @@ def decode(message: Message, payload: bytes, beside: Mapping[str, Raw] | None = 
     for slot, data, number in _cut(message, payload):
         cells[slot.name] = data
         values |= _decoded(slot, data, number)
+        _check_barred(message, values)
         _verify(slot, message.slots, cells)
     return values
 
