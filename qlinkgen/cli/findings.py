@@ -167,6 +167,10 @@ def _interrupted(found: Dissection, at: int) -> Words:
 
 def _unknown(found: Dissection, fault: Fault) -> Words:
     frame, number = found.frame, fault.seen or 0
+    if frame.texts:
+        texts = sorted(each.message.text or b"" for each in found.plan.known(found.direction).values())
+        known = ", ".join(id_text(frame, frame.texts.index(each)) for each in texts)
+        return f"the payload does not begin with a {frame.id_name}: known are {known}", ""
     near = _nearest(number, list(found.plan.known(found.direction).values()))
     cause = f"the nearest known is {near.message.command}, {id_text(frame, near.id)}" if near else ""
     return f"{frame.id_name} {id_text(frame, number)} is unknown", cause

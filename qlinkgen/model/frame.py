@@ -133,6 +133,15 @@ class Derivation:
     added: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """A message id of ``least`` to ``most`` characters, with which payloads begin."""
+
+    name: str
+    least: int
+    most: int
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
     """A part of a frame. ``scalar`` is the integer of all parts but constants, payload and checksum.
@@ -169,6 +178,8 @@ class Part:
     max_size: int = 0
     #: Payload only: bytes that are sent at least where zeros at the end are not, None if all are sent.
     trim: int | None = None
+    #: Payload only: the message id that it begins with, None if other parts hold the id.
+    opening: Opening | None = None
 
     @property
     def field(self) -> Field:

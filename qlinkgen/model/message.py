@@ -66,6 +66,8 @@ class Message:
     leading: bool = False
     #: Values of its frame that conditions of its fields test.
     decided_by: tuple[Value, ...] = ()
+    #: Its id, if payloads begin with ids of several lengths; None for others. Its first field is this text.
+    text: bytes | None = None
     #: What the frame allows, where all records together may be larger than that; None for others.
     limit: int | None = None
 
@@ -98,6 +100,11 @@ class Message:
     def values(self) -> tuple[Value, ...]:
         """Values in wire order; constants, reserved bytes and counts are not values."""
         return tuple(values_of(self.fields))
+
+    @property
+    def opened(self) -> bool:
+        """Whether its first field is its id."""
+        return bool(self.text)
 
     @property
     def echoes(self) -> tuple[str, ...]:

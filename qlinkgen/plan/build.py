@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import assert_never
 
 from qlinkgen.model.frame import Frame, FrameKinds
-from qlinkgen.model.message import Message
+from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import select
 from qlinkgen.plan.envelope import Envelope
@@ -34,7 +36,7 @@ def plan_of(protocol: Protocol, options: Options | None = None) -> Plan:
     """Plan a protocol for an output."""
     options = options or Options()
     messages = select.kept(protocol, options)
-    frames = frame_plans(protocol.frame)
+    frames = _with_texts(frame_plans(protocol.frame), protocol)
     names = {message.name for message in messages}
     beside = [member.number for frame in frames.values() for member in frame.values.values()]
     used = select.named(messages, beside)
@@ -56,6 +58,16 @@ def plan_of(protocol: Protocol, options: Options | None = None) -> Plan:
         flags=tuple(each for each in protocol.flags if not options.only or each.name in used),
         received_directions=select.received_directions(protocol, options.role),
     )
+
+
+def _with_texts(frames: Mapping[Direction, FramePlan], protocol: Protocol) -> Mapping[Direction, FramePlan]:
+    """The frames with the ids that their payloads begin with."""
+    texts = {each.id: each.text for each in protocol.messages if each.text is not None}
+    if not texts:
+        return frames
+    ids = tuple(texts[number] for number in sorted(texts))
+    shared = {id(each): replace(each, texts=ids) for each in frames.values()}
+    return {direction: shared[id(each)] for direction, each in frames.items()}
 
 
 def _carrying(stated: Frame, frame: FramePlan, message: Message) -> tuple[FramePlan, ...]:

@@ -167,6 +167,8 @@ def value_text(scalar: Scalar, raw: int) -> str:
             return str(native_from_raw(scalar, raw)).lower()
         case Characters():
             return repr(raw.to_bytes(meaning.number, "big").decode("latin-1"))
+        case None if isinstance(scalar.text, Words):
+            return scalar.text.text(raw).decode()
         case Float() | None:
             unit = f" {scalar.unit}" if scalar.unit else ""
             raw_text = f" (raw {raw})" if scalar.scaling else ""
@@ -462,7 +464,8 @@ def part_text(part: Part, frame: FramePlan) -> str:  # noqa: C901  # a case a pa
         case PayloadPart():
             kept = "" if part.trim is None else ", without zeros at their end"
             kept += f", at least {part.trim}" if part.trim else ""
-            return f"the message's fields{kept}"
+            before = f"{part.opening}, and then " if part.opening else ""
+            return f"{before}the message's fields{kept}"
         case CheckPart():
             text = check_text(part.check, frame) + _held_text(part, frame)
             return text if part.check.complete else f"{text}; bits {_sent_bits_text(part.check)} are sent"
@@ -515,7 +518,9 @@ def _sent_bits_text(check: Check) -> str:
 
 
 def id_text(frame: FramePlan, number: int) -> str:
-    """A message id: decimal if it shares a byte, otherwise hexadecimal."""
+    """A message id: text if it has several lengths, decimal if it shares a byte, otherwise hexadecimal."""
+    if number < len(frame.texts):
+        return f'"{frame.texts[number].decode()}"'
     end = frame.end
     match end:
         case ByMark():

@@ -349,6 +349,8 @@ class _Walk:
             number = gathered(self.envelope.id, cells)
             self.number = None if number is None else number + self.frame.base
             self.address = gathered(self.envelope.address, cells) if self.envelope.address else None
+            if (texts := self.plan.texts(self.direction)) is not None:
+                self.number = texts.number(self._found(self.envelope.payload).data)
         self.message = None if self.number is None else self._told(self.known.get(self.number))
 
     def _told(self, message: MessagePlan | None) -> MessagePlan | None:
@@ -598,8 +600,12 @@ class _Walk:
         if message is None:
             if len(data) > part.most and self.alone:
                 self._fault("length", Rule.SIZE, at, part, len(data))
+            unknown = bool(self.frame.texts) and not self._short(part)
+            if unknown:
+                self._fault("unknown", Rule.MESSAGE, at, part)
             if places:
-                self.spans.append(Span(part, *self._sent(places), len(data)))
+                fault = "unknown" if unknown else ""
+                self.spans.append(Span(part, *self._sent(places), len(data), None, fault))
             return
         if not data and message.payload.empty_is_default and not self._short(part):
             return

@@ -122,6 +122,7 @@ class EndedReader(FrameReader):
         taken = Taken(dict(cells), cells[part.name], end=whole.end)
         taken.kept = self._plan.kept
         self._judge(taken)
+        self._open(taken)
         return taken
 
     def _judge(self, taken: Taken) -> None:

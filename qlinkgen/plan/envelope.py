@@ -203,11 +203,13 @@ class Envelope:
         return all(bits.part in done for bits in pieces)
 
     def identifies(self, part: Part) -> bool:
-        """Whether the part holds bits of the message number or the address."""
+        """Whether the part holds bits of the message number, or of an address beside it."""
         return id(part) in self._identifying
 
     @cached_property
     def _identifying(self) -> frozenset[int]:
+        if self.payload.opening:
+            return frozenset()
         return frozenset(id(bits.part) for bits in (*self.id, *self.address))
 
     def offset(self, wanted: Part) -> int:

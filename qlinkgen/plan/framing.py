@@ -88,6 +88,7 @@ class FramePlan:
         name: name of the kind, "" if there is one.
         base: what is added to the number of a message in frames of this kind.
         only: the direction that frames of this kind go, None for both.
+        texts: the ids that payloads begin with, by their number in generated code; () if parts hold ids.
         doc: what the document says of it; "" if there are several kinds, each of which has its own.
         section: where the document says so.
     """
@@ -103,6 +104,7 @@ class FramePlan:
     name: str = ""
     base: int = 0
     only: Direction | None = None
+    texts: tuple[bytes, ...] = ()
     doc: Text = ""
     section: Text = ""
 
@@ -325,11 +327,18 @@ def _delimited(whole: DelimitedFrame, direction: Direction) -> FramePlan:
         transparency=transparency,
         receiver=Gaps() if frame.ends_idle else _receiver(envelope, transparency, directed=whole.directed),
         address=address.name if address else "",
-        id_name=frame.id_bits[-1].name if frame.id_bits else "",
+        id_name=_id_name(frame),
         idle=frame.idle,
         doc=frame.doc,
         section=frame.section,
     )
+
+
+def _id_name(frame: DelimitedFrame) -> str:
+    opening = frame.payload.opening
+    if opening is not None:
+        return opening.name
+    return frame.id_bits[-1].name if frame.id_bits else ""
 
 
 def _transparency(frame: DelimitedFrame) -> Transparency:
@@ -386,7 +395,8 @@ def _part(frame: DelimitedFrame, part: StatedPart, transparency: Transparency) -
             return ConstantPart(part.name, part.constant)
         case "payload":
             most_sent = transparency.most_sent(part.max_size)
-            return PayloadPart(part.name, part.min_size, part.max_size, most_sent, part.trim)
+            opening = part.opening.name if part.opening else ""
+            return PayloadPart(part.name, part.min_size, part.max_size, most_sent, part.trim, opening)
         case "checksum":
             assert part.checksum is not None
             check = Check(part.checksum)

@@ -128,6 +128,7 @@ class PayloadPart:
 
     Attributes:
         trim: bytes that are sent at least where zeros at the end are not, None if all are sent.
+        opening: name of the message id that it begins with, "" if other parts hold the id.
     """
 
     name: str
@@ -135,6 +136,7 @@ class PayloadPart:
     most: int
     most_sent: int
     trim: int | None = None
+    opening: str = ""
 
     #: Size of an empty payload.
     size = 0

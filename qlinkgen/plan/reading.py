@@ -29,6 +29,7 @@ from qlinkgen.plan.parts import (
     PayloadPart,
     gathered,
 )
+from qlinkgen.plan.text_ids import text_ids
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing
 from qlinkgen.plan.tree import MessagePlan
 
@@ -232,6 +233,7 @@ class FrameReader:
         self._coding = None if plan.whole or not isinstance(stuffing, Coded) else stuffing.bytewise
         self._stuffed = {part.name for part in stuffed_parts(plan)}
         self._bare = isinstance(plan.receiver, Rescan) and plan.receiver.bare
+        self._texts = text_ids(each.message for each in known.values())
 
     def read(self, wire: bytes, start: int = 0, *, hunting: bool = False) -> Taken:
         """The frame that begins at ``start``; contents, and check values over them, are not checked.
@@ -255,6 +257,7 @@ class FrameReader:
         taken.end = cursor.at
         taken.due = bytes((rule.insert,)) if rule and cursor.due else b""
         taken.payload = self._judged(taken, sent)
+        self._open(taken)
         return taken
 
     def _has(self, part: Part, taken: Taken) -> bool:
@@ -323,6 +326,11 @@ class FrameReader:
         number = gathered(self._envelope.id, taken.cells)
         taken.number = None if number is None else number + self._plan.base
         taken.address = gathered(self._envelope.address, taken.cells) if self._envelope.address else None
+
+    def _open(self, taken: Taken) -> None:
+        """Identify the message by its payload, if that begins with the id."""
+        if self._texts is not None:
+            taken.number = self._texts.number(taken.payload)
 
     def _check_known(self, at: int, taken: Taken) -> None:
         """Without a leading constant, only number and address distinguish a frame from noise."""

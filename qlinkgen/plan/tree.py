@@ -11,12 +11,14 @@ from qlinkgen.model.fields import Layout, layouts_of
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
-from qlinkgen.model.types import Enum, Flags
+from qlinkgen.model.types import Enum, Flags, Scalar
+from qlinkgen.model.words import Words
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import OneOf
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.payload import Member, PayloadPlan
 from qlinkgen.plan.select import Role
+from qlinkgen.plan.text_ids import TextIds, text_ids
 
 _DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 
@@ -228,6 +230,17 @@ class Plan:
     def carrier(self) -> MessagePlan | None:
         """The message that carries them, None if there are none."""
         return next((each for each in self.messages if each.message.carries), None)
+
+    def texts(self, direction: Direction) -> TextIds | None:
+        """The ids that payloads of a direction begin with, None if other parts hold ids."""
+        return text_ids(each.message for each in self.received(direction))
+
+    @property
+    def id_words(self) -> tuple[Words, ...]:
+        """The ids of the selected messages as words of their payloads, each once."""
+        firsts = (each.message.fields[0].type for each in self.messages if each.message.opened)
+        found = {each.text for each in firsts if isinstance(each, Scalar) and isinstance(each.text, Words)}
+        return tuple(sorted(found, key=lambda each: each.enum))
 
     def known(self, direction: Direction) -> Mapping[int, MessagePlan]:
         """Messages that a decoder for a direction accepts, by number."""

@@ -39,7 +39,8 @@ class AskedBuilder:
         if not isinstance(self._frame, DelimitedFrame):
             return ()
         common = self._file.defaults.response
-        numbered = any(bits.role == "message" for bits in self._frame.id_bits)
+        opened = self._frame.payload.opening is not None
+        numbered = opened or any(bits.role == "message" for bits in self._frame.id_bits)
         stated = isinstance(common, AnswerSpec) and common.id is not None and not common.id.relative
         if numbered and not stated:
             return ()
@@ -59,6 +60,8 @@ class AskedBuilder:
         first = answers[0]
         least = min(0 if each.empty_is_default else each.min_size for each in answers)
         most = max(each.max_size for each in answers)
+        if first.text:  # the carrier begins with it, too
+            least, most = least - len(first.text), most - len(first.text)
         fields = self._fields.build({"data": self._data(answers, least, most)} if most else {}, path)
         fields = fields_without_end(fields, self._frame, path, self._report)
         return Message(

@@ -22,6 +22,7 @@ from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.stuffing import build_stuffing, check_unique
 from qlinkgen.schema.terminators import check_terminator_part
+from qlinkgen.schema.text_ids import coding_without, with_text_id, without_text_id
 from qlinkgen.schema.types import TypeBuilder
 
 _KINDS = ("parts", "marked", "packet")
@@ -152,6 +153,8 @@ class FrameBuilder:
             what = f"{idle} and {name} both end a frame"
             self._parts.fault("bad-frame", (*path, name), what, "remove one of them")
         silence = self._parts.silence(specs[idle], (*path, idle), names=[*specs]) if idle else None
+        given = specs
+        specs, opening = without_text_id(specs, path, self._report)
         specs = {name: part for name, part in specs.items() if name not in silences}
         main = _main_check(specs)
         parts = placed(
@@ -160,14 +163,20 @@ class FrameBuilder:
                 for name, part in specs.items()
             )
         )
+        parts = with_text_id(parts, opening, given.get(opening))
         parts = PartConditions(specs, path, self._report).added(parts)
-        stuffed, coded_as = spec.stuffing if isinstance(spec, FrameSpec) else None, spec.coding
+        stuffed = spec.stuffing if isinstance(spec, FrameSpec) else None
+        coded_as = coding_without(spec.coding, opening)
         alone = bool(silence and silence.alone)
         coding = CodingBuilder(parts, self._parts, self._report, path[:-1], silent=alone).build(coded_as)
         if stuffed:
             self._check_stuffing(parts, path, alone=alone, coded=coded_as is not None)
             insert, names, after = build_stuffing(stuffed, parts, self._parts, self._report)
             coding = (insert,), names, after
+        if opening and coding[2]:
+            what = f"{opening} has several lengths, but only the payload is stuffed"
+            hint = "stuff the finished frame, or give ids one length"
+            self._report.error("bad-text-id", (*path, opening), what, hint, of_key=True)
         parts = without_end(parts, coding[1] if coding[0] else (), path, self._report)
         check_counters(parts, path, self._report)
         resolved = with_parties(parts, self._file, path, self._report)

@@ -207,8 +207,8 @@ NumberOrWord = Annotated[
 Name = Annotated[str, WithJsonSchema({"type": "string", "pattern": NAME_PATTERN})]
 Count = Annotated[StrictInt, Field(ge=1)]
 Id = Annotated[StrictInt, Field(ge=0)]
-#: An id of a part with a type such as text[3].
-TextId = Annotated[StrictStr, Field(min_length=1)]
+#: An id of a part with a type such as text[3] or text[0..8].
+TextId = StrictStr
 AnswerNumber = Annotated[
     notation.AnswerId,
     PlainValidator(notation.answer_id),

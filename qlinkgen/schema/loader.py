@@ -32,6 +32,7 @@ from qlinkgen.schema.source import Data, parse
 from qlinkgen.schema.structure import check_structure
 from qlinkgen.schema.switches import without_choices
 from qlinkgen.schema.terminators import check_terminator
+from qlinkgen.schema.text_ids import check_text_ids
 from qlinkgen.schema.types import TypeBuilder
 from qlinkgen.schema.unconfirmed import report_unconfirmed
 from qlinkgen.schema.unknown import UnknownBuilder
@@ -170,6 +171,7 @@ def _build(
         frame = begun(frame, commands.messages, report)
     transactions = EchoBuilder(file, frame, messages.places, report).build(commands.commands)
     check_terminator(frame, commands.messages, report)
+    check_text_ids(commands.messages, messages.id_places, report)
     types.report_unused()
     check_names(file, frame, commands.messages, messages.places, report)
     report_unconfirmed(file, report)

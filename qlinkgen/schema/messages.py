@@ -28,6 +28,7 @@ from qlinkgen.schema.seeds import SeedBuilder
 from qlinkgen.schema.separated import check_separator, separated
 from qlinkgen.schema.sides import check_side
 from qlinkgen.schema.source import Path
+from qlinkgen.schema.text_ids import Opener
 
 _FRAME: Path = ("frame",)
 
@@ -90,6 +91,7 @@ class MessageBuilder:
         self.places: dict[str, Path] = {}
         self.id_places: dict[str, Path] = {}
         self._ids = IdBuilder(report, frame)
+        self._opener = Opener(frame, report)
         #: Numbers of messages that only their turn tells, None for others.
         self._turns = itertools.count() if turned else None
         self.asked = AskedBuilder(file, report, fields, frame)
@@ -231,6 +233,8 @@ class MessageBuilder:
         return () if layout.inherited else self._ids.fixed(layout.number, direction, layout.number_path)
 
     def _added(self, message: Message, layout: Written) -> Message:
+        if (text := self._ids.text(message.id)) is not None:
+            message = self._opener.opened(message, text, layout.path)
         if tested := {test.value for field in message.fields for test in field.when}:
             known = self._beside(layout, message.direction).known.values()
             message = replace(message, decided_by=tuple(each for each in known if each.name in tested))
@@ -279,6 +283,8 @@ class MessageBuilder:
         self.asked.check_name()
         path = self.id_places[answers[0].name]
         message = self.asked.carrier(answers, path)
+        if (text := answers[0].text) is not None:
+            message = self._opener.opened(message, text, path)
         self.places[message.name] = self.id_places[message.name] = path
         return message
 

@@ -19,7 +19,7 @@ _HEX = re.compile(r"\s*(?:[0-9a-fA-F]{2}\s*)+\Z", re.ASCII)
 _ANSWER_ID = re.compile(
     r"\s*request\.id\s*(?:(?P<sign>[+-])\s*(?P<number>0x[0-9A-Fa-f]+|0|[1-9][0-9]*)\s*)?\Z", re.ASCII
 )
-_TEXT_ID = re.compile(r"[!-~]{1,8}\Z", re.ASCII)
+_TEXT_ID = re.compile(r"[!-~]{0,40}\Z", re.ASCII)
 _DURATION = re.compile(
     r"\s*(?P<number>[0-9]{1,12}(?:\.[0-9]{1,12})?)\s*(?P<unit>bytes?|us|ms|s)\s*\Z", re.ASCII
 )

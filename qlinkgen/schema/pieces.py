@@ -17,6 +17,7 @@ from qlinkgen.schema.notation import NO_ID, StatedId, shown
 from qlinkgen.schema.part_texts import text_of
 from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
+from qlinkgen.schema.text_ids import TextIds
 from qlinkgen.schema.types import TypeBuilder
 
 #: Maximum number of bits of a message id.
@@ -244,11 +245,18 @@ class IdBuilder:
         by_parts = isinstance(frame, DelimitedFrame) and frame.directed
         self._values = {each.name for each in frame.values} if isinstance(frame, DelimitedFrame) else set()
         self._directed = by_parts or self.direction is not None
+        opening = frame.payload.opening if isinstance(frame, DelimitedFrame) else None
+        #: Ids that are texts of several lengths, None without any.
+        self._texts = TextIds(opening, report) if opening else None
 
     @property
     def identifies(self) -> bool:
         """Whether the frame has a message id, apart from its direction; unknown frames do."""
-        return bool(self._pieces) or not isinstance(self._frame, DelimitedFrame)
+        return bool(self._pieces or self._texts) or not isinstance(self._frame, DelimitedFrame)
+
+    def text(self, number: int) -> bytes | None:
+        """The text of an id of several lengths, None for other ids."""
+        return self._texts.text(number) if self._texts else None
 
     def number(
         self, stated: StatedId, direction: Direction, path: Path, whose: str = "", *, way: str = ""
@@ -273,6 +281,8 @@ class IdBuilder:
             if isinstance(given, str):
                 self._not_number(given, path)
             return (given if isinstance(given, int) else 0 if given else self._missing(path)) + stated.added
+        if self._texts is not None:
+            return self._text_number(self._texts, stated, path)
         pieces = [each for each in self._pieces if each.only in (None, direction)]
         names = [each.name for each in pieces]
         if not names:
@@ -292,6 +302,22 @@ class IdBuilder:
             others = {each.name for each in self._pieces if each not in pieces}
             given = {name: value for name, value in given.items() if name not in others}
         return self._added(self._composed(given, pieces, path), stated.added, path, whose)
+
+    def _text_number(self, texts: TextIds, stated: StatedId, path: Path) -> int:
+        if stated.given is None:
+            return self._missing(path)
+        if stated.added:
+            self._wrong(path, "an id that is text has no sum", "write the id of the answer, or remove it")
+            return 0
+        given = stated.given
+        if isinstance(given, Mapping):
+            own = {name: each for name, each in given.items() if name not in self._values}
+            if [*own] != [texts.name]:
+                hint = f"give {texts.name}, and values of every frame"
+                self._wrong(path, f"the id consists of {texts.name}", hint)
+                return 0
+            given = own[texts.name]
+        return texts.number(given, path)
 
     def fixed(self, stated: StatedId, direction: Direction, path: Path) -> tuple[tuple[str, int], ...]:
         """The values of the frame that an id states beside the pieces of the number, and their numbers."""

@@ -395,6 +395,11 @@ _ALL = (
         "An encoder refuses another value, and a receiver takes no frame with another one for the message.",
     ),
     Rule(
+        "bad-text-id",
+        "An id of several lengths begins the payload, and no id and payload are taken for a longer id.",
+        "Receivers find a message by the longest id that a payload begins with, and the frame by its end.",
+    ),
+    Rule(
         "bad-echo",
         "A field of an answer repeats a field of its request, or a part of its frame, that it can hold.",
         "It identifies the request that a response belongs to.",

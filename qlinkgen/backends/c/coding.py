@@ -89,6 +89,11 @@ class EndedView:
     head_checks: Sequence[str] = ()
 
     @property
+    def headed(self) -> bool:
+        """Whether a statement that completes a frame names its header."""
+        return any("head" in line for line in (*self.put_header, *self.put_trailer, *self.fills))
+
+    @property
     def writes_trailer(self) -> bool:
         """Whether bytes after the payload are written."""
         return any("trailer" in line for line in (*self.put_trailer, *self.put_check, *self.fills))

@@ -52,7 +52,7 @@ def sender_of(frame: FramePlan, prefix: str) -> Sender:
     address_type = unsigned_type(envelope.address[0].bits if envelope.address else 8)
     return Sender(
         address_member(frame.id_name) if address == "id" else "id",
-        unsigned_type(_reach(envelope) or 8),
+        unsigned_type(_reach(envelope) or max(8, len(frame.texts).bit_length())),
         address,
         address_type if address else "",
         f"{prefix}_parts_t" if envelope.values else "",
@@ -67,7 +67,8 @@ def _reach(envelope: Envelope) -> int:
 def id_bits(frame: FramePlan) -> int:
     """Bits of a message number, above it that of the family of kinds."""
     numbers = ((each.base, _reach(each.envelope)) for each in frame.every)
-    return max((base | (1 << size) - 1).bit_length() for base, size in numbers) or 8
+    most = max((base | (1 << size) - 1).bit_length() for base, size in numbers)
+    return most or max(8, len(frame.texts).bit_length())
 
 
 def _sender_of_kinds(frame: FramePlan, prefix: str) -> Sender:

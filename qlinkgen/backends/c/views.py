@@ -16,6 +16,7 @@ from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned_type
 from qlinkgen.backends.c.parts import PartWriter, length_bounds
 from qlinkgen.backends.c.places import id_bits, in_hex, sender_of
+from qlinkgen.backends.c.text_ids import numbering
 from qlinkgen.plan.coding import Add, Insertion
 from qlinkgen.plan.ends import ByMessage, ByTerminator, Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.framing import FramePlan
@@ -58,6 +59,9 @@ class FrameView:
     body_size: int
     check_optional: bool
     max_wire: int
+    #: The function that finds the id with which a payload begins, and its call; none if parts hold ids.
+    numbering: Sequence[str] = ()
+    identify: str = ""
     idle: tuple[int, int] | None
     broken: bool
 
@@ -140,7 +144,7 @@ def directed(plan: Plan) -> bool:
 def _uses_direction(frame: FramePlan) -> bool:
     """Whether a function that finds a frame in bytes depends on its direction."""
     by_message = any(isinstance(each.end, ByMessage) for each in frame.every)
-    return frame.checks_header or by_message or frame.seeded
+    return frame.checks_header or by_message or frame.seeded or bool(frame.texts)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -374,8 +378,20 @@ def parts_views(whole: Plan, layouts: Layouts) -> dict[str, PartsViews]:
         writer = _writer(whole, plan.frame, way, layouts)
         body_size = _body_size(writer)
         frame = frame_view(whole, plan.frame, body_size=body_size, max_wire=plan.frame.max_wire)
-        found[way] = _parts_views(writer, frame)
+        found[way] = _parts_views(writer, _numbered(frame, whole, own_prefix(writer.prefix, way)))
     return found
+
+
+def _numbered(frame: FrameView, whole: Plan, own: str) -> FrameView:
+    """The view of a frame, with what finds the ids with which payloads begin; ``own`` is its prefix."""
+    if not whole.frame.texts:
+        return frame
+    passed = frame.pass_decode_direction
+    return replace(
+        frame,
+        numbering=numbering(whole, own, frame.id_type, directed=bool(passed)),
+        identify=f"frame->{frame.id} = {own}_number_({passed}frame->payload, frame->size);",
+    )
 
 
 def kind_views(whole: Plan, kind: FramePlan, every: FrameView, layouts: Layouts) -> PartsViews:

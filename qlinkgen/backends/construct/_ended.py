@@ -242,7 +242,7 @@ class EndedFrame(Frame):
         return self._judged(cells, numbers[Id], payload, numbers.get(Address, 0))
 
     def _check_begin(self, numbers: Mapping[type, int]) -> None:
-        if self.bare and Id in numbers:
+        if self.bare and not self.texts and Id in numbers:
             message = self._known(numbers[Id])
             if Address in numbers and not _allowed(message, numbers[Address]):
                 raise FrameError(

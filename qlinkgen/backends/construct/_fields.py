@@ -417,10 +417,13 @@ class Message(Construct):
         empty_is_default: bool = False,
         seeds: Sequence[tuple[str, bytes]] = (),
         settled: Sequence[tuple[str, int]] = (),
+        text: bytes | None = None,
     ) -> None:
         super().__init__()
         self.name = name
         self.id = message_id
+        #: The id that its payload begins with, None if parts of its frame hold the id.
+        self.text = text
         #: Values of its frame that are always the same.
         self.settled = dict(settled)
         self.fields = fields

@@ -432,6 +432,8 @@ class Frame(Construct):
         self.parts = parts
         self.by_name = {message.name: message for message in messages}
         self.by_id = {message.id: message for message in self.by_name.values()}
+        known = self.by_id.values()
+        self.texts = {each.text: each.id for each in known if each.text is not None}
         self.address = address
         self.stuffing = stuffing
         self.hunt = hunt
@@ -651,6 +653,8 @@ class Frame(Construct):
         request: bytes = b"",
     ) -> Container:
         """Check a frame in cells: check value, message, sizes, values, address. Returns its message."""
+        if self.texts:
+            number = self._begun(payload)
         found = self.by_id.get(number)
         seeds = found.seeds if found else {}
         unseeded = [check for check in self._due(cells) if not _seeds(check)]
@@ -689,6 +693,11 @@ class Frame(Construct):
             return self._deciding(message, lambda values: held[id(values)])
         except ConstructError as error:
             raise FrameError("range", f"{message.name}; {error}") from None
+
+    def _begun(self, payload: bytes) -> int:
+        """The number of the longest id that a payload begins with, -1 if it has none."""
+        begun = [text for text in self.texts if payload.startswith(text)]
+        return self.texts[max(begun, key=len)] if begun else -1
 
     def _compare_blocks(self, cells: Mapping[str, bytes], payload: bytes) -> None:
         for blocks in self.parts:
@@ -855,7 +864,7 @@ class DelimitedFrame(Frame):
         self._refuse(part, cells)
         known = len(numbers)
         self._identify(cells, numbers)
-        if self.bare and len(numbers) > known and Id in numbers:
+        if self.bare and not self.texts and len(numbers) > known and Id in numbers:
             message = self._known(numbers[Id])
             if Address in numbers and not _allowed(message, numbers[Address]):
                 raise FrameError(

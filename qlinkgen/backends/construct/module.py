@@ -21,7 +21,7 @@ from qlinkgen.backends.construct.payload import (
 from qlinkgen.backends.construct.tree import Call, Definition, Node, Ref, Sequence, hexadecimal
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.integer import Integer
-from qlinkgen.model.message import Direction
+from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.naming import record_key
 from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
 from qlinkgen.plan.conditional import Conditional
@@ -104,10 +104,7 @@ def _message(message: MessagePlan, types: Types) -> Call:
         settings["empty_is_default"] = True
     if message.payload.trim is not None:
         settings["keep"] = message.payload.trim
-    if message.message.seeds:
-        settings["seeds"] = message.message.seeds
-    if message.message.settled:
-        settings["settled"] = message.message.settled
+    settings |= _stated(message.message)
     if message.payload.separator:
         settings |= _dividing(message.payload)
     elif message.payload.walked:
@@ -118,6 +115,18 @@ def _message(message: MessagePlan, types: Types) -> Call:
     return Call(
         name, (message.name, hexadecimal(message.id), *fields(message, types)), tuple(settings.items())
     )
+
+
+def _stated(message: Message) -> dict[str, Node]:
+    """The settings of a message that are as the document states them."""
+    settings: dict[str, Node] = {}
+    if message.seeds:
+        settings["seeds"] = message.seeds
+    if message.settled:
+        settings["settled"] = message.settled
+    if message.text is not None:
+        settings["text"] = message.text
+    return settings
 
 
 def _dividing(payload: PayloadPlan) -> dict[str, Node]:

@@ -255,6 +255,8 @@ class PartsView:
     before: ConditionalView | None = None
     after: AfterView | None = None
     kind: OfKind | None = None
+    #: The tables of ids that payloads begin with, [] if parts hold ids.
+    texts: Sequence[str] = ()
 
     template = "delimited"
 

@@ -25,7 +25,7 @@ from qlinkgen.backends.python.frame_views import (
     StuffingView,
     UniqueView,
 )
-from qlinkgen.backends.python.layout import in_hex, literal, slice_of
+from qlinkgen.backends.python.layout import in_hex, literal, slice_of, wrapped
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.values import counter_fact
 from qlinkgen.model.checksum import Sum
@@ -242,7 +242,7 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
         id_start=_id_start(envelope),
         id_of=pieces.number(envelope, envelope.id, "head"),
         id_of_buffer=pieces.number(envelope, envelope.id, *pieces.BUFFER),
-        id_of_frame=_quick_id(envelope),
+        id_of_frame="_number(frame, known)" if plan.frame.texts else _quick_id(envelope),
         address_of=pieces.number(envelope, envelope.address, "head") if _leads(envelope) else "",
         bare=bare,
         verified=verified,
@@ -254,6 +254,7 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
         master=_master(plan),
         tail_tests=[test for part in envelope.back for test in pieces.tail_tests(envelope, part)],
         before=before_view(envelope),
+        texts=_texts(plan),
     )
 
 
@@ -271,6 +272,21 @@ def parts_of_kind(plan: Plan, frame: FramePlan, result: str) -> PartsView:
         id_of_frame=in_frame,
         kind=OfKind(result, begun=list(_begun(envelope)), passes=True),
     )
+
+
+def _texts(plan: Plan) -> list[str]:
+    """The tables of the ids that payloads begin with; [] if parts hold ids."""
+    known = [each for each in map(plan.texts, plan.received_directions) if each is not None]
+    found = {text: number for each in known for text, number in each.numbers}
+    if not found:
+        return []
+    pairs = [f"{literal(text)}: {number}" for text, number in sorted(found.items(), key=lambda each: each[1])]
+    sizes = [str(size) for size in sorted({len(text) for text in found}, reverse=True)]
+    return [
+        "#: Ids that payloads begin with, and their numbers; the sizes of these ids.",
+        *wrapped("_IDS = {", pairs, "}", 0),
+        *wrapped("_ID_SIZES = (", sizes if len(sizes) > 1 else [f"{sizes[0]},"], ")", 0),
+    ]
 
 
 def _blank_trailer(envelope: Envelope, address: AddressView | None) -> str:

@@ -161,7 +161,7 @@ class Module:
             bus=tables.bus(plan.protocol.bus),
             commands=tables.command_rows(plan, self.place),
             records=[MessageRow(each.name, self.place.classes[each.name]) for each in plan.layouts],
-            scales=[*self.builder.scales, *self._field_checks(), *tables.word_tables(plan.enums)],
+            scales=[*self.builder.scales, *self._field_checks(), *tables.word_tables(plan)],
             classes=self._classes(models, views, sections.ways),
             public=self._public(view, decoded),
             imports=self._imports(list(views.values()), models),

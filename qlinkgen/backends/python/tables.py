@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import assert_never
@@ -63,10 +63,11 @@ def enum_model(enum: Enum, name: str) -> ConstantsModel:
     return ConstantsModel(name, _doc(enum.doc, enum.section, rest), members)
 
 
-def word_tables(enums: Iterable[Enum]) -> list[str]:
-    """Definitions of the words of enums, and of their numbers."""
+def word_tables(plan: Plan) -> list[str]:
+    """Definitions of the words of enums and of ids, and of their numbers."""
     lines: list[str] = []
-    for words in (each.words for each in enums if each.words is not None):
+    found = [each.words for each in plan.enums if each.words is not None]
+    for words in (*found, *plan.id_words):
         written = list(map(literal, words.words))
         lines += listing(f"{words_of(words)} = (", written, ")", 0)
         pairs = [f"{word}: {number}" for number, word in enumerate(written)]

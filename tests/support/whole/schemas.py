@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from tests.support.whole import frames, kinds, words
+from tests.support.whole import frames, kinds, text_ids, words
 from tests.support.whole.decided import decide
 from tests.support.whole.fields import FieldMaker, Room
 from tests.support.whole.frames import Shape
@@ -113,6 +113,8 @@ class _Maker:
             _link(rng, document)
         _stop_answers(random.Random(f"streams {self.seed}"), document)
         _begin_with_break(random.Random(f"break {self.seed}"), document)
+        if not several:
+            text_ids.draw(random.Random(f"text ids {self.seed}"), document)
         maker.forget_unused(document)
         if not several:
             _name_parts(rng, document)

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tests.support.whole.reference.document import long_form
+from tests.support.whole.reference.document import before_end, long_form
 from tests.support.whole.reference.fields import Fields
 from tests.support.whole.reference.layouts import Message
 from tests.support.whole.reference.notation import Doc
+from tests.support.whole.reference.text_ids import begun, texts_of
 
 CARRIER = "unasked"
 
@@ -20,16 +21,17 @@ class Asked:
 
     answers: Mapping[str, Sequence[Message]]
     carrier: Message
+    #: The id that all of them begin with, b"" if other parts hold it.
+    text: bytes = b""
 
     @property
     def names(self) -> set[str]:
         """The names of all answers."""
         return {each.name for answers in self.answers.values() for each in answers}
 
-    @staticmethod
-    def payload(values: Mapping[str, Any]) -> bytes:
+    def payload(self, values: Mapping[str, Any]) -> bytes:
         """The payload that the carrier carries."""
-        return bytes(values.get("data", b""))
+        return self.text + bytes(values.get("data", b""))
 
 
 def asked(document: Doc, fields: Fields, messages: Sequence[Message]) -> Asked | None:
@@ -54,6 +56,8 @@ def asked(document: Doc, fields: Fields, messages: Sequence[Message]) -> Asked |
         if each
     }
     low, high = min(each.sizes[0] for each in found), max(each.sizes[1] for each in found)
+    text = next(iter(texts_of(document, found[:1])), b"")
+    low, high = low - len(text), high - len(text)
     ended = any(isinstance(spec, dict) and spec.get("role") == "terminator" for spec in parts.values())
     kind = "text" if ended and "coding" not in document["frame"] else "bytes"
     slots = fields.build(
@@ -61,7 +65,7 @@ def asked(document: Doc, fields: Fields, messages: Sequence[Message]) -> Asked |
     )
     first = found[0]
     carrier = Message(CARRIER, first.number, "response", slots, first.addresses, first.default_address)
-    return Asked(ordered, carrier)
+    return Asked(ordered, begun(document, before_end(carrier, document)), text)
 
 
 def _states(document: Doc, answer: Message) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from tests.support.whole.reference import document, values
+from tests.support.whole.reference import document, text_ids, values
 from tests.support.whole.reference.asked import CARRIER, Asked, asked
 from tests.support.whole.reference.fields import Fields, bits_of
 from tests.support.whole.reference.frames import Frame
@@ -71,6 +71,7 @@ class Reference:
 
     def _read(self, data: Doc) -> None:
         self.data = data
+        text_ids.opened(data)
         shape = data["frame"]
         if "parts" in shape:
             self.frame, self.requests = Frame(data, "response"), Frame(data, "request")
@@ -79,6 +80,7 @@ class Reference:
         parts = {**shape.get("parts", {}), **shape.get("packet", {})}
         sizes = [spec["size"] for spec in map(part_doc, parts.values()) if spec["role"] == "payload"]
         most = whole_span(sizes[0] if sizes else shape["marked"]["payload"])[1]
+        most = shape.get("stated", most)
         addressed = [
             inner or name
             for name, spec in parts.items()
@@ -102,6 +104,9 @@ class Reference:
         self.asked = asked(data, Fields(data, most), self.messages)
         if self.asked is not None:
             self.messages = (*self.messages, self._with_values(self.asked.carrier))
+        if isinstance(self.frame, Frame) and isinstance(self.requests, Frame):
+            self.requests.texts |= text_ids.texts_of(data, self.known("request").values())
+            self.frame.texts |= text_ids.texts_of(data, self.known("response").values())
 
     def frame_of(self, direction: Direction) -> Frame | Marked | Packets | Kinds:
         """The frame of a direction; only frames of parts can differ."""

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from tests.support.whole.reference import text_ids
 from tests.support.whole.reference.fields import Fields, bits_of
 from tests.support.whole.reference.layouts import Message, Number, Run, Slot
 from tests.support.whole.reference.notation import Direction, Doc, as_doc, octets, of_way, whole_span
@@ -18,6 +19,8 @@ def numbered(document: Doc, given: Any, direction: str) -> int:
     parts = document["frame"].get("parts", {})
     if not parts:
         return int(given)
+    if "opening" in document["frame"]:
+        return text_ids.number_of(document["frame"], given)
     own = {name: as_doc(of_way(spec, direction)) for name, spec in parts.items()}
     pieces = [(name, each) for name, spec in own.items() for each in bits_of(spec)]
     for wanted in ("direction", "message"):
@@ -51,6 +54,7 @@ def settled(document: Doc, message: Message) -> Mapping[str, int]:
         (name, each) for name, part in document["frame"].get("parts", {}).items() for each in bits_of(part)
     ]
     ids = {inner or name for name, (inner, role, *_) in pieces if role in ("message", "direction")}
+    ids.add(document["frame"].get("opening"))
     return {name: each for name, each in given.items() if name not in ids} if isinstance(given, dict) else {}
 
 
@@ -71,7 +75,8 @@ def seeds(document: Doc, message: str) -> Mapping[str, bytes]:
 
 def messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, ...]:
     """All messages of a file, in order."""
-    return tuple(with_separator(each, document) for each in _messages(document, fields, addressed))
+    found = (with_separator(each, document) for each in _messages(document, fields, addressed))
+    return tuple(text_ids.begun(document, each) for each in found)
 
 
 def with_separator(message: Message, document: Doc) -> Message:
@@ -87,8 +92,12 @@ def with_separator(message: Message, document: Doc) -> Message:
         places = [document["replies"][name]]
     spec = next(each for each in places if each)
     chosen = spec.get("separator", usual)
+    if reply == "response":
+        common = long_form(document.get("defaults", {}).get("response") or {})
+        own = long_form(spec.get("response") or {})
+        chosen = own.get("separator", spec.get("separator", common.get("separator", usual)))
     if chosen in (None, "none") or not message.slots:
-        return message
+        return before_end(message, document)
     leading = isinstance(chosen, dict)
     chosen = chosen["before"] if isinstance(chosen, dict) else chosen
     ends = [each for each in document["frame"]["parts"].values() if isinstance(each, dict)]
@@ -97,6 +106,16 @@ def with_separator(message: Message, document: Doc) -> Message:
     barred = chosen.encode() + end
     slots = tuple(_filled(slot, barred) for slot in message.slots)
     return replace(message, slots=slots, separator=chosen.encode(), leading=leading, barred=barred)
+
+
+def before_end(message: Message, document: Doc) -> Message:
+    """A message whose texts do not have the bytes that end the frame, unless a coding hides them."""
+    parts = document["frame"].get("parts", {})
+    ends = [each for each in parts.values() if isinstance(each, dict) and each.get("role") == "terminator"]
+    end = b"".join(each["text"].encode() if "text" in each else octets(each["value"]) for each in ends)
+    if "coding" in document["frame"] or not end.isascii():
+        return message
+    return replace(message, slots=tuple(_filled(slot, end) for slot in message.slots), barred=end)
 
 
 def _filled(slot: Slot, barred: bytes) -> Slot:
@@ -254,8 +273,9 @@ def long_form(given: Any) -> Doc:
     """A response in its long form, without any fields for a word."""
     if isinstance(given, str):
         return {}
-    is_long = given.keys() <= {"id", "fields", "means", "frame"} and (
+    is_long = given.keys() <= {"id", "fields", "means", "frame", "separator"} and (
         isinstance(given.get("fields"), dict)
+        or given.get("id") == ""
         or ("fields" not in given and re.match(r"[^a-z{]|request|{'\w+': \d", str(given.get("id", ""))))
     )
     return dict(given) if is_long else {"fields": given}

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from tests.support.whole.reference import checks
+from tests.support.whole.reference import checks, text_ids
 from tests.support.whole.reference.codings import Coding, codings
 from tests.support.whole.reference.fields import Fields, bits_of, bits_of_type, byte_pieces
 from tests.support.whole.reference.layouts import (
@@ -220,6 +220,8 @@ class Frame:
         self.by_role: Mapping[str, Part] = {part.role: part for part in self.parts[::-1]}
         #: Bytes of attributes of messages, by number of the message.
         self.seeds: dict[int, Mapping[str, bytes]] = {}
+        #: Ids that payloads begin with, by their number.
+        self.texts: dict[bytes, int] = {}
         self.checks = [part for part in self.parts if part.role == "checksum"]
         self.blocks: Part | None = next((part for part in self.parts if part.role == "blocks"), None)
         self.payload_at = self.parts.index(self.by_role["payload"])
@@ -593,6 +595,9 @@ class Frame:
             if self.longer and cut.get(self.longer.name):
                 part = self.longer
             return self.step * get(part.pieces, cut[part.name]) if part and part.name in cut else None
+        if role == "message" and self.texts:
+            payload = self.by_role["payload"].name
+            return text_ids.longest(self.texts, cut[payload]) if payload in cut else None
         found = (
             self.id_bits()
             if role == "message"
