@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from types import ModuleType
 from typing import Protocol as Shape
 
@@ -13,8 +12,9 @@ from qlinkgen.link import codec as link
 from qlinkgen.model.fields import Layout, Record, Records, Value, chosen
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import address_attribute, attribute
+from qlinkgen.model.objects import attributes_of
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.values import BadValue, Json, Native, check_items, default_of, natives_of, to_json
+from qlinkgen.model.values import BadValue, Json, Native, to_json
 
 
 class MessageObject(link.Message, Shape):
@@ -49,17 +49,13 @@ def build(
         fix = " ".join(f"{name}=VALUE" for name in missing)
         raise Failure(f"{message.name}: {', '.join(missing)} has no default; add {fix}")
     try:
-        natives = natives_of((*beside, *message.values), given)
-        numbers = {value.name: default_of(value) for value in message.values if not value.field.slot}
-        own = {value.name: value for value in chosen((*beside, *message.values), {**numbers, **natives}.get)}
-        for name, native in natives.items():
-            check_items(own[name], native)
+        attributes = attributes_of(getattr(codec, "RECORDS", {}), (*beside, *message.values), given)
     except BadValue as error:
         raise Failure(f"{message.name}: {error}") from None
     try:
         built: MessageObject = codec.MESSAGES[message.name](
             **{address_attribute(name): number for name, number in address.items()},
-            **{attribute(name): _object(codec, own[name], native) for name, native in natives.items()},
+            **attributes,
         )
     except codec.EncodeError as error:
         raise Failure(str(error)) from None
@@ -72,19 +68,6 @@ def fields(message: Message, found: link.Message) -> dict[str, Json]:
         value.name: to_json(value, _plain(value, found))
         for value in chosen(message.values, lambda name: getattr(found, attribute(name)))
     }
-
-
-def _object(codec: ModuleType, value: Value, native: Native) -> object:
-    """The value for the constructor of a message: an object of its class for each record."""
-    kind = value.type
-    if isinstance(kind, Records) and isinstance(native, list):
-        one = replace(value, type=Record(kind.layout))
-        return [_object(codec, one, each) for each in native]
-    if not isinstance(kind, Record) or not isinstance(native, Mapping):
-        return native
-    own = chosen(kind.layout.values, native.get)
-    values = {attribute(each.name): _object(codec, each, native[each.name]) for each in own}
-    return codec.RECORDS[kind.layout.name](**values)
 
 
 def _plain(value: Value, owner: object) -> Native:
