@@ -12,7 +12,7 @@ from qlinkgen.cli.simulating import plan_of
 from qlinkgen.cli.wire_options import seconds
 
 BELONGS: Belongs = {
-    **dict.fromkeys(("nodes", "echo"), (BUS,)),
+    **dict.fromkeys(("nodes", "echo", "value", "file", "memory", "delay", "refuse"), (BUS,)),
     **dict.fromkeys(("ring", "programs", "keys", "closed", "length"), (RING,)),
     "crc": (BUS, RING),
 }
@@ -21,6 +21,29 @@ BELONGS: Belongs = {
 @click.command("simulate")
 @protocol_argument
 @click.option("--nodes", metavar="LIST", help="Nodes of a bus: 3, 1-16 or 1,3,5-7; one node by default.")
+@click.option(
+    "--value",
+    multiple=True,
+    metavar="COMMAND.FIELD=VALUE",
+    help="A value of the answers of a bus; for numbers also ramp:0..100:5s or noise:21:0.5.",
+)
+@click.option(
+    "--values",
+    "file",
+    type=click.Path(),
+    metavar="FILE",
+    help="A YAML file with values, delay, refuse and memory.",
+)
+@click.option("--memory", is_flag=True, help="Answer with what requests have set, by the names of fields.")
+@click.option(
+    "--delay",
+    multiple=True,
+    metavar="COMMAND=SECONDS",
+    help="Answer a command so much later.",
+)
+@click.option(
+    "--refuse", multiple=True, metavar="COMMAND=PROBABILITY", help="Refuse a command, 1 for every time."
+)
 @click.option(
     "--ring",
     metavar="LIST",
@@ -43,7 +66,7 @@ BELONGS: Belongs = {
 @click.option("--seconds", "length", callback=seconds, metavar="SECONDS", help="End a ring after this time.")
 @click.option("--link", type=click.Path(), metavar="PATH", help="Create a symbolic link to the port.")
 @click.option("--faults", metavar="SPEC", help="Faults: drop=0.01,late=0.02:0.05-0.2 or all=0.05.")
-@click.option("--seed", type=int, metavar="N", help="Seed of the faults, for reproducible runs.")
+@click.option("--seed", type=int, metavar="N", help="Seed of faults, noise and refusals.")
 @click.option(
     "--baud",
     type=click.IntRange(1, 100_000_000),
@@ -55,6 +78,11 @@ BELONGS: Belongs = {
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
     nodes: str | None,
+    value: tuple[str, ...],
+    file: str | None,
+    memory: bool,
+    delay: tuple[str, ...],
+    refuse: tuple[str, ...],
     ring: str | None,
     programs: tuple[str, ...],
     keys: tuple[str, ...],
@@ -73,8 +101,10 @@ def command(  # noqa: PLR0917  # click passes them by name
     to standard error, including a final summary of requests, responses and faults.
 
     Nodes of qlink behave as documented: FIFO, motor, inputs and outputs, program store; they consume path
-    words after a node_start. Nodes of another PROTOCOL with a master send the defaults of each response, with
-    echoed fields copied from the request.
+    words after a node_start. Nodes of another PROTOCOL with a master send the defaults of each response, or
+    the values given, with echoed fields copied from the request. COMMAND is a command or the full name of an
+    answer, VALUE as for encode; --memory answers with the latest value that any request has had for a field
+    of the same name and kind.
 
     trio is a ring: PORT is an additional place between the last node and the first, which then has address 1.
     Coordinators keep the data they receive, and run the network words of a BASIC program given by --program.
@@ -92,7 +122,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     \b
     qlinkgen simulate qlink --nodes 1-16 --link /tmp/qlink
     qlinkgen simulate qlink --nodes 1,3 --baud 115200 --faults drop=0.02,flip=0.01 --seed 7
-    qlinkgen simulate thermostat.yaml --nodes 1-4
+    qlinkgen simulate thermostat.yaml --nodes 1-4 --value get_zones.temperatures=250,251
     qlinkgen simulate trio --ring coordinator,keypad,coordinator --link /tmp/ring
     qlinkgen simulate trio --ring coordinator,keypad --closed --program 1=main.bas
     qlinkgen simulate mc1231a --link /tmp/chip
@@ -118,9 +148,13 @@ def command(  # noqa: PLR0917  # click passes them by name
 
         simulate_host(link=link, baud=baud, plan=plan)
     else:
+        from qlinkgen.cli.behaviour import Behaviour  # noqa: PLC0415
         from qlinkgen.cli.simulate_bus import simulate_bus  # noqa: PLC0415
 
-        simulate_bus(protocol, nodes, link=link, baud=baud, plan=plan, echo=echo, crc=crc)
+        behaviour = Behaviour(value, file, delay, refuse, memory, seed)
+        simulate_bus(
+            protocol, nodes, link=link, baud=baud, plan=plan, echo=echo, crc=crc, behaviour=behaviour
+        )
 
 
 def _kind(name: str, crc: str | None) -> Kind:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
+from qlinkgen.cli.behaviour import Behaviour, Nodes
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import load_protocol
 from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.cli.simulating import run_bus, say
 from qlinkgen.cli.wire_options import counted, parse_nodes, with_crc
-from qlinkgen.link.codec import Codec
+from qlinkgen.link.codec import Codec, Framed
 from qlinkgen.link.slave import Node, SlaveEngine
 from qlinkgen.plan import plan_of
 from qlinkgen.protocols.qlink.facts import NODES
@@ -28,11 +29,12 @@ def simulate_bus(
     plan: FaultPlan | None,
     echo: bool,
     crc: str | None,
+    behaviour: Behaviour,
 ) -> None:
     """Run the nodes on a pty until a signal."""
     from qlinkgen.sim.pty_bus import PtyBus  # noqa: PLC0415  # needs a system that has ptys
 
-    codec, numbered = _nodes(protocol, nodes, crc)
+    codec, numbered, delays = _nodes(protocol, nodes, crc, behaviour)
     bits = codec.BUS.bits_per_byte
     # A line delivers byte by byte; without a speed, whole frames are equivalent.
     wire = Wire(
@@ -41,29 +43,37 @@ def simulate_bus(
     turnaround = TURNAROUND * bits / baud if baud else 0.0
     engines = [SlaveEngine(codec, node, turnaround=turnaround) for node in numbered]
     for engine in engines:
+        engine.delays = delays
         wire.attach(engine, f"node {engine.node.number}")
     run_bus(PtyBus(wire, link=link), link, f"{counted(len(engines), 'node')} of {protocol}")
     say(_summary(engines), plan)
 
 
-def _nodes(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, list[Node]]:
+def _nodes(
+    name: str, nodes: str | None, crc: str | None, behaviour: Behaviour
+) -> tuple[Codec, list[Node], Mapping[type[Framed], float]]:
     if is_shipped(name, "qlink"):
         from qlinkgen.codecs import qlink  # noqa: PLC0415  # only for Q.link
 
-        return with_crc(qlink, qlink.Codec, crc), _qlink_nodes(parse_nodes(nodes or "1", NODES[0], NODES[-1]))
+        if behaviour:
+            raise Failure(
+                "nodes of qlink behave as documented, and take no values; omit --value, --values, --memory, "
+                "--delay and --refuse"
+            )
+        own = _qlink_nodes(parse_nodes(nodes or "1", NODES[0], NODES[-1]))
+        return with_crc(qlink, qlink.Codec, crc), own, {}
     from qlinkgen.cli.codec import load_codec  # noqa: PLC0415  # Q.link does not need the compiler
-    from qlinkgen.sim.generic import GenericNode  # noqa: PLC0415
 
     protocol = load_protocol(name, crc)
     codec = load_codec(protocol)
+    made = Nodes(protocol, codec, plan_of(protocol), behaviour)
     if protocol.bus.nodes is None or protocol.address_name is None:
         if nodes is not None:
             raise Failure(f"the frames of {protocol.name} have no address; omit --nodes {nodes}")
-        return codec, [GenericNode(codec, plan=plan_of(protocol))]
+        return codec, [made.node()], made.delays
     first, last = protocol.bus.nodes
     numbers = parse_nodes(str(first) if nodes is None else nodes, first, last)
-    plan = plan_of(protocol)
-    return codec, [GenericNode(codec, number, plan) for number in numbers]
+    return codec, [made.node(number) for number in numbers], made.delays
 
 
 def _qlink_nodes(numbers: Iterable[int]) -> list[Node]:

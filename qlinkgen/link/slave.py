@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Literal, Protocol, cast
 
 from qlinkgen.link.codec import (
@@ -100,7 +101,11 @@ class SlaveEngine:
         numbering: the counter of its frames, None without one.
         frames: each frame, oldest first, which the driver removes; None, unless somebody is told.
         break_time: seconds of the break that a driver sends before each frame, 0 for none.
+        delays: seconds by class of request that its answers take longer than the turnaround; a simulation
+            may set them.
     """
+
+    delays: Mapping[type[Framed], float] = MappingProxyType({})
 
     def __init__(
         self,
@@ -271,7 +276,7 @@ class SlaveEngine:
             self._queue(request, response, now)
             inserted = self._encode(request)[-1:] != self._last
             self._due = now + self._turnaround + (self._byte_time if inserted else 0.0)
-            self._due += self._turns(request, before)
+            self._due += self._turns(request, before) + self.delays.get(type(request), 0.0)
 
     def _begun(self, request: Framed, response: Answers) -> Answers:
         """Begin or stop answers without an end; return what is sent once."""

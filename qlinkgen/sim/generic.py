@@ -10,12 +10,15 @@ from typing import Any
 from qlinkgen.link.asked import answer_to
 from qlinkgen.link.codec import Codec, Command, Echoes, Framed, Many, Message, is_message
 from qlinkgen.link.many import is_endless, is_listed, nodes_asked
-from qlinkgen.link.slave_dialogue import Handling
+from qlinkgen.link.slave_dialogue import Handling, Refusal
 from qlinkgen.link.turn import is_turned
 from qlinkgen.model.transaction import Proof
 from qlinkgen.plan import Plan
 from qlinkgen.plan.codec import Codec as Interpreter
 from qlinkgen.plan.content import with_decided
+from qlinkgen.sim.memory import Memory
+from qlinkgen.sim.refusals import Refusals
+from qlinkgen.sim.values import Values
 
 #: Name of a rule class of a generated module to its smallest legal value.
 _SMALLEST: Mapping[str, Callable[[Any], object]] = {  # Any: a rule of the module's own, of the class named
@@ -40,22 +43,41 @@ _REPEATED: Mapping[str, Callable[[Any, int], object]] = {  # Any: as above
 
 
 class GenericNode:
-    """Answers every command with the defaults of its response.
+    """Answers every command with the values given to it, otherwise with the defaults of its response.
 
-    Echoed fields repeat the request, and required fields have their smallest legal value. It has no state:
-    written values cannot be read back.
+    Echoed fields repeat the request, and required fields have their smallest legal value. A list whose size
+    the request tells has its items again and again. Without a memory, written values cannot be read back.
 
     Attributes:
         number: address of the node; 0 for frames without one.
         requests: number of requests.
     """
 
-    def __init__(self, codec: Codec, number: int = 0, plan: Plan | None = None) -> None:
+    def __init__(
+        self,
+        codec: Codec,
+        number: int = 0,
+        plan: Plan | None = None,
+        *,
+        values: Values | None = None,
+        memory: Memory | None = None,
+        refusals: Refusals | None = None,
+    ) -> None:
         """Make a node of a generated module.
 
-        ``plan`` of the same protocol gives the defaults of fields that echoed ones decide.
+        Args:
+            codec: the module.
+            number: its address.
+            plan: the plan of the same protocol gives the defaults of fields that echoed ones decide.
+            values: values of its answers.
+            memory: keeps what requests set, in place of these values.
+            refusals: the requests that it refuses.
         """
         self.number = number
+        self._values = values
+        self._memory = memory
+        self._refusals = refusals
+        self._now = 0.0
         self.requests = 0
         self._codec = codec
         self._interpreter = Interpreter(plan) if plan else None
@@ -67,13 +89,21 @@ class GenericNode:
         }
 
     def handle(
-        self,
-        request: Framed,
-        now: float,  # noqa: ARG002  # the interface of nodes
+        self, request: Framed, now: float
     ) -> Message | list[Message] | Iterator[Message] | Handling | None:
-        """Return the response or responses to a request; None if the command has none or is unknown."""
+        """Return the response or responses to a request; None if the command has none or is unknown.
+
+        Raises:
+            Refusal: it refuses the request.
+        """
         self.requests += 1
+        self._now = now
         command = self._commands.get(type(request))
+        if command is not None and self._refusals and (refusal := self._refusals.of(command)):
+            reply, given = refusal
+            raise Refusal(self._answer(reply.message, request, reply.echoes, given))
+        if self._memory:
+            self._memory.keep(request)
         if command is None or command.response is None:
             return None
         if command.steps:
@@ -100,7 +130,8 @@ class GenericNode:
         if is_endless(many):
             return itertools.repeat(one)
         if many.reply is None:
-            return [one] * (count or 1)
+            rest = (self._answer(command.response, request, command.echoes, values) for _ in range(1, count))
+            return [one, *rest]
         return [one, self._answer(many.reply, request, command.replies[many.reply].echoes, {})]
 
     def _talk(self, command: Command, request: Framed) -> Handling:
@@ -122,13 +153,25 @@ class GenericNode:
         self, kind: type[Message], request: Framed, echoes: Echoes, given: Mapping[str, object]
     ) -> Message:
         values = dict(self._required.get(kind) or required_values(kind))
+        own = self._own(kind.NAME)
+        values |= own
         values |= {name: getattr(request, of) if isinstance(of, str) else of for name, of in echoes.items()}
-        values |= given
+        values |= {name: _repeated(own.get(name), each) for name, each in given.items()}
         if address := kind.ADDRESS:
             values[address] = self.number
         make: Callable[..., Message] = kind
         message = make(**values)
-        return self._settled(self._interpreter, message, request) if self._interpreter else message
+        settled = self._settled(self._interpreter, message, request) if self._interpreter else message
+        if settled is not message:
+            for name in own.keys() - echoes.keys() - given.keys():
+                if getattr(settled, name) is not None:
+                    setattr(settled, name, own[name])
+        return settled
+
+    def _own(self, name: str) -> dict[str, object]:
+        """Return the values given to the node for an answer, and those that requests have set."""
+        values = self._values.of(name, self._now) if self._values else {}
+        return {**values, **self._memory.of(name)} if self._memory else values
 
     def _settled(self, interpreter: Interpreter, message: Message, request: Framed) -> Message:
         """Return an answer in which the fields that echoed values decide have their defaults."""
@@ -163,6 +206,13 @@ def _sizes(command: Command, asked: Framed) -> dict[str, object]:
         for name, number, _ in command.sizes:
             found |= _items(command.response, name, getattr(asked, number))
     return found
+
+
+def _repeated(own: object, asked: object) -> object:
+    """Return own items in the number of those asked for; without own ones, those."""
+    if not isinstance(own, list | bytes | str) or not isinstance(asked, type(own)) or not own:
+        return asked
+    return (own * (len(asked) // len(own) + 1))[: len(asked)]
 
 
 def _items(message: type[Message], name: str, count: int) -> dict[str, object]:
