@@ -287,6 +287,12 @@ class DelimitedFrame:
         first = self.coding[0] if self.coding and not known else None
         return first if isinstance(first, Insert) else None
 
+    @property
+    def late_insert(self) -> int | None:
+        """The inserted byte that may follow the last one of a frame, None if none may."""
+        last = self.stuffing if not self.checked_after and self.parts[-1].name in self.coded else None
+        return last.insert if last else None
+
     @cached_property
     def paired(self) -> int | None:
         """The byte before a second one in coded bytes, if a terminator is another pair with it; else None.

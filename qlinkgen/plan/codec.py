@@ -103,6 +103,12 @@ class Given:
     beside: Mapping[str, Raw]
 
 
+def sent(frame: FramePlan, payload: bytes) -> bytes:
+    """A payload as the length of its frame counts it: with inserted bytes if only the payload is stuffed."""
+    way = frame.transparency
+    return way.rule.encode(payload) if isinstance(way, PayloadStuffing) else payload
+
+
 class Codec:
     """Encodes and decodes the messages of a plan."""
 
@@ -137,13 +143,8 @@ class Codec:
         """A valid frame around a payload, which is not checked; ``beside`` are values of the frame."""
         message = self.plan.message(name)
         frame = message.frame_for(len(payload))
-        cells = self.cells(message, self.sent(payload), address, beside, frame)
+        cells = self.cells(message, sent(frame, payload), address, beside, frame)
         return self.join(message, cells, request, frame)
-
-    def sent(self, payload: bytes) -> bytes:
-        """The payload as a length counts it: with inserted bytes if only the payload is stuffed."""
-        transparency = self.plan.frame.transparency
-        return transparency.rule.encode(payload) if isinstance(transparency, PayloadStuffing) else payload
 
     def cells(
         self,

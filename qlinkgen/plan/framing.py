@@ -284,7 +284,7 @@ def _kinds(frame: FrameKinds) -> tuple[FramePlan, ...]:
     """Each kind has a plan of its own."""
     found: list[FramePlan] = []
     for each in frame.kinds:
-        plan = _delimited(each.frame, "response")
+        plan = _delimited(each.frame, "response", alone=False)
         end = ByTurn() if each.frame.is_payload else plan.end
         base = frame.base(each.family)
         found.append(replace(plan, end=end, name=each.title, base=base, only=each.only))
@@ -309,7 +309,8 @@ def _several(kinds: tuple[FramePlan, ...]) -> FramePlan:
     )
 
 
-def _delimited(whole: DelimitedFrame, direction: Direction) -> FramePlan:
+def _delimited(whole: DelimitedFrame, direction: Direction, *, alone: bool = True) -> FramePlan:
+    """Plan the frames of a direction; ``alone``: all frames have these parts."""
     frame = whole.towards(direction)
     transparency = _transparency(frame)
     envelope = _envelope(frame, transparency)
@@ -325,7 +326,9 @@ def _delimited(whole: DelimitedFrame, direction: Direction) -> FramePlan:
         envelope=envelope,
         end=end,
         transparency=transparency,
-        receiver=Gaps() if frame.ends_idle else _receiver(envelope, transparency, directed=whole.directed),
+        receiver=Gaps()
+        if frame.ends_idle
+        else _receiver(envelope, transparency, alone=alone and not whole.directed),
         address=address.name if address else "",
         id_name=_id_name(frame),
         idle=frame.idle,
@@ -449,9 +452,9 @@ def _slot(bits: PartBits) -> Slot:
             assert_never(bits.role)
 
 
-def _receiver(envelope: Envelope, transparency: Transparency, *, directed: bool) -> Receiver:
-    """Choose between hunting and rescanning, for all targets."""
-    if not directed and isinstance(transparency, FrameStuffing) and _unique(envelope, transparency):
+def _receiver(envelope: Envelope, transparency: Transparency, *, alone: bool) -> Receiver:
+    """Choose between hunting and rescanning, for all targets; ``alone``: all frames have these parts."""
+    if alone and isinstance(transparency, FrameStuffing) and _unique(envelope, transparency):
         return Hunt(transparency.rule.after[0], transparency.rule.insert)
     return Rescan(
         bare=not envelope.starts,

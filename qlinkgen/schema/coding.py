@@ -111,7 +111,7 @@ class CodingBuilder:
             what = "lengths and check values cannot cover bytes of themselves"
             self._error((*path, "over"), what, f"write over: [{payload}]")
         else:
-            check_end(self._parts, place, self._report)
+            check_end(self._parts, place, (*self._frame, "parts"), self._report)
 
     def _error(self, path: Path, what: str, hint: str) -> None:
         self._report.error("bad-coding", path, what, hint, of_key=True)

@@ -106,7 +106,9 @@ def begun(kinds: FrameKinds, messages: list[Message], report: Reporter) -> Frame
             first = replace(first, bits=(replace(first.bits[0], constants=numbers),))
             kind = replace(kind, frame=replace(kind.frame, parts=(first, *kind.frame.parts[1:])))  # noqa: PLW2901
         found.append(kind)
-    _Checker(report).starts(found)
+    checker = _Checker(report)
+    checker.starts(found)
+    checker.inserted(found)
     return replace(kinds, kinds=tuple(found))
 
 
@@ -223,11 +225,10 @@ class _Checker:
         if end is not None and end.constant == frame.preamble:
             what = f"{name} begins with the bytes that end it"
             self._error((*path, end.name), what, "let it begin with other bytes")
-        if frame.coding and end is None:
-            what = f"frames of {name} are coded, and have no terminator"
-            self._error(
-                (*path[:-1], "coding"), what, "add a terminator, or describe the kind in a file of its own"
-            )
+        if frame.coding and first in frame.coded:
+            what = f"{first} of {name} is coded, but receivers tell kinds by the first bytes as sent"
+            hint = f"name the coded parts, without {first}: over: [...]"
+            self._error((*path[:-1], "coding"), what, hint)
         for part in frame.parts:
             if wrong := _excess(part):
                 what = f"{part.name} of {name} {wrong}, which kinds of frame do not have"
@@ -248,6 +249,17 @@ class _Checker:
                     ids = kind.frame.leading or other.frame.leading
                     hint = f"a receiver cannot tell them apart; use other constants{' or ids' if ids else ''}"
                     self._error(("frames", kind.name), what, hint)
+
+    def inserted(self, kinds: Sequence[FrameKind]) -> None:
+        """Check that no kind begins with the byte that may follow the last one of a frame."""
+        for kind, other in itertools.product(kinds, kinds):
+            insert = other.frame.late_insert
+            apart = kind.only and other.only and kind.only != other.only
+            if insert is not None and not apart and any(each[0] == insert for each in kind.frame.starts):
+                what = f"{kind.name} begins with {insert:02X}, the byte inserted into {other.name}"
+                what += ", which may follow its last one"
+                hint = f"begin it with another byte, or do not code the last part of {other.name}"
+                self._error(("frames", kind.name), what, hint)
 
     def addresses(self, kinds: Sequence[FrameKind]) -> None:
         """Check that the address is the same in all kinds that have one."""

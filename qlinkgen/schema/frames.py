@@ -204,8 +204,8 @@ class FrameBuilder:
             return False
         self._check_length(frame, path)
         check_conditions(frame, path, self._report)
-        stated = "coding" if self._file.frame.coding is not None else "stuffing"
-        check_unique(frame, ("frame", stated), self._report)
+        stated = "coding" if self._file.frames or self._file.frame.coding is not None else "stuffing"
+        check_unique(frame, (*path[:-1], stated), self._report)
         check_terminator_part(frame, path, self._report)
         if frame.ends_idle:
             self._check_idle(frame, path)

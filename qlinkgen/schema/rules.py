@@ -231,11 +231,11 @@ _ALL = (
         "Constants or message ids at their beginning tell kinds of frame apart; each message knows its kind.",
         "A receiver tries each kind of its direction where one may begin. A kind with if: {direction: "
         "request} has no answers, and may begin like one of the other direction; one with parts of one "
-        "direction has no messages without a direction. Kinds have no idle line, stuffing, trim or blocks, a "
-        "coding only with a terminator, and do not end with the bytes that they begin with. A value or a "
-        "counter of several kinds is the same in all. A message without frame travels in the kinds that no "
-        "message names, which then have the same parts except constants, lengths and check values; the "
-        "shortest one that fits is sent.",
+        "direction has no messages without a direction. Kinds have no idle line, trim or blocks, do not "
+        "end with the bytes that they begin with, and no coding of their first part. A value or a counter of "
+        "several kinds is the same in all. A message without frame travels in the kinds that no message "
+        "names, which then have the same parts except constants, lengths and check values; the shortest one "
+        "that fits is sent.",
     ),
     Rule(
         "short-frame",

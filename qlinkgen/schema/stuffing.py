@@ -26,7 +26,7 @@ def build_stuffing(
     after_stuffing = spec.checksum == "after"
     if after_stuffing:
         exempt = _all_but_payload(spec, parts, report)
-        check_end(parts, (*_PATH, "checksum"), report)
+        check_end(parts, (*_PATH, "checksum"), ("frame", "parts"), report)
     else:
         _check_middle(exempt, parts, report)
     payload = next(part for part in parts if part.role == "payload")
@@ -54,10 +54,13 @@ def _all_but_payload(spec: StuffingSpec, parts: tuple[Part, ...], report: Report
     return others
 
 
-def check_end(parts: Sequence[Part], place: Path, report: Reporter) -> None:
-    """Check that a payload stuffed before the checksum has a length and a checksum."""
+def check_end(parts: Sequence[Part], place: Path, frame: Path, report: Reporter) -> None:
+    """Check that a payload stuffed before the checksum has a length and a checksum.
+
+    ``place`` is the path of what says so, ``frame`` that of the parts.
+    """
     roles = [part.role for part in parts]
-    needs = (place, ("frame", "parts"))
+    needs = (place, frame)
     if "checksum" not in roles:
         what, hint = "the frame has no checksum to compute after the stuffing", "remove it, or add a checksum"
         report.error("bad-frame", place, what, hint, needs=needs)
@@ -83,7 +86,7 @@ def check_unique(frame: DelimitedFrame, path: Path, report: Reporter) -> None:
     stuffing = frame.stuffing
     if stuffing is None:
         return
-    needs = (path, ("frame", "parts"))
+    needs = (path, (*path[:-1], "parts"))
     if not frame.preamble:
         what, hint = (
             "the frame does not begin with a constant, so stuffing has no use",

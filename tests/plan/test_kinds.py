@@ -280,6 +280,64 @@ def test_each_kind_has_a_coding_of_its_own() -> None:
     assert [fault.kind for fault in dissect(plan, wrong, "message").faults] == ["stuffing"]
 
 
+OPEN = """
+qlinkgen: 1
+protocol: {name: open_coded, revision: "1", source: Made up}
+byteorder: big
+frames:
+  escaped:
+    parts:
+      start: 7E
+      size: {type: u8, counts: data}
+      data: {role: payload, size: 0..20}
+      crc: {type: u8, algorithm: crc-8/smbus, over: [data]}
+    coding: {escape: 7D, xor: 20, of: [7E, 7D, 06]}
+  stuffed:
+    parts:
+      start: A5 5A
+      count: {type: u8, counts: data}
+      data: {role: payload, size: 0..20}
+      total: {type: u8, algorithm: sum8, over: [data]}
+    coding: {insert: 00, after: A5}
+  ack: {parts: {byte: 06}}
+bus: {kind: host}
+defaults: {repeat: safe}
+commands: {}
+messages:
+  note: {frame: escaped, direction: response, fields: {data: bytes}}
+  total: {frame: stuffed, direction: response, fields: {data: bytes}}
+  taken: {frame: ack, direction: response, fields: {}}
+"""
+
+
+def test_codings_without_a_terminator_are_decoded_as_they_are_read() -> None:
+    protocol, faults = loads(OPEN, "open.yaml")
+    assert protocol is not None, faults
+    plan, generated = plan_of(protocol), load_codec(protocol)
+    codec = Codec(plan)
+    note, total = codec.encode("note", {"data": b"\x06~"}), codec.encode("total", {"data": b"\xa5\0"})
+    taken = codec.encode("taken", {})
+    assert note.startswith(bytes.fromhex("7E 02 7D 26 7D 5E"))
+    # A byte is inserted after the last one. Receivers do not wait for it.
+    assert total == bytes.fromhex("A5 5A 02 A5 00 00 A5 00")
+    stream = note[:4] + taken + total + taken + total[:-1] + note + total + taken
+    events = receiver(plan, "response").run(stream)
+    found = [event.decoded.message.name if event.decoded else event.kind for event in events]
+    names = ["taken", "total", "taken", "total", "note", "total", "taken"]
+    assert [each for each in found if each in plan.by_name] == names
+    for size in (1, 5, len(stream)):
+        decoder = generated.StreamDecoder("response")
+        pieces = [stream[at : at + size] for at in range(0, len(stream), size)]
+        heard = [event for piece in pieces for event in decoder.feed(piece)] + decoder.finish()
+        assert [getattr(each, "NAME", "") or each.kind for each in heard] == found
+        assert [each.offset for each in heard if hasattr(each, "offset")] == [
+            event.offset for event in events if not event.decoded
+        ]
+        assert decoder.counters.skipped == 4
+    assert generated.decode_response(total).data == generated.decode_response(total[:-1]).data == b"\xa5\0"
+    assert generated.encode(generated.decode_response(note)) == note
+
+
 ONE_WAY = """
 qlinkgen: 1
 protocol: {name: one_way, revision: "1", source: Made up}

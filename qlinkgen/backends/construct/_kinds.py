@@ -8,7 +8,15 @@ from typing import BinaryIO
 from construct import Construct, Container
 
 from ._fields import Message, Values
-from ._frames import Constant, DelimitedFrame, Frame, FrameError, Part, Sending
+from ._frames import (
+    Constant,
+    DelimitedFrame,
+    Frame,
+    FrameError,
+    Part,
+    Sending,
+    Stuffing,
+)
 
 
 class AnyKind(Frame):
@@ -27,6 +35,11 @@ class AnyKind(Frame):
         first = self.parts[0]
         starts = [first.data] if isinstance(first, Constant) else self.starts
         return any(each.startswith(wire[: len(each)]) for each in starts)
+
+    def _told(self, base: int, least: int, starts: Sequence[bytes]) -> None:
+        """Set the attributes."""
+        self.base, self.least, self.starts = base, least, starts
+        self.by_id = {each.id - base: each for each in self.by_name.values()}
 
     def _number(self, message: Message) -> int:
         return message.id - self.base
@@ -48,12 +61,10 @@ class Kind(AnyKind, DelimitedFrame):
         least: int = 0,
         address: str = "",
         starts: Sequence[bytes] = (),
+        stuffing: Stuffing | None = None,
     ) -> None:
-        super().__init__(parts, messages, address=address)
-        self.starts = starts
-        self.by_id = {each.id - base: each for each in self.by_name.values()}
-        self.base = base
-        self.least = least
+        super().__init__(parts, messages, address=address, stuffing=stuffing)
+        self._told(base, least, starts)
 
 
 class Kinds(Frame):

@@ -232,8 +232,10 @@ def _kinds(plan: Plan, direction: Direction, messages: Mapping[str, str]) -> Cal
         settings |= {"least": kind.envelope.payload.least} if kind.envelope.payload.least else {}
         settings |= {"address": record_key(kind.address)} if kind.address else {}
         settings |= {} if kind.envelope.preamble else {"starts": kind.envelope.starts}
-        name = "EndedKind" if kind.whole else "Kind"
+        name = "CodedKind" if isinstance(kind.transparency, Coded) else "Kind"
+        settings |= dict(_stuffing(kind))
         if kind.whole:
+            name = "EndedKind"
             settings |= dict(_ended_at(kind))
             settings |= dict(_codings(kind))
             settings |= dict(_paired(kind))

@@ -15,7 +15,7 @@ from typing import assert_never
 from qlinkgen.backends.vectors.choice import filled, whole
 from qlinkgen.backends.vectors.writer import Json
 from qlinkgen.model.integer import Integer
-from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.codec import Codec, sent
 from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.content import Raw, pack, pack_items, places, unpack_items
 from qlinkgen.plan.expr import Clear, Condition, Legible, OneOf, Within
@@ -175,8 +175,8 @@ class _Frame:
 
     def _made(self, payload: bytes) -> dict[str, bytes]:
         good = self._good
-        sent = self._codec.sent(payload)
-        return self._codec.cells(self._message, sent, good.address or 0, good.beside, self._frame)
+        data = sent(self._frame, payload)
+        return self._codec.cells(self._message, data, good.address or 0, good.beside, self._frame)
 
     def _derived(self, cells: dict[str, bytes], changed: Part) -> Mapping[str, bytes]:
         """The parts, those that are derived from others computed again."""

@@ -86,6 +86,7 @@ def draw(rng: random.Random) -> Kinds:
     if coded.random() < 0.35:
         families.append(_coded(coded, frames, leads.pop(), families[0].shape.bus))
     _add_one_way(random.Random(repr(more.getstate())), frames, families)
+    _add_codings(random.Random(f"codings {more.getstate()!r}"), frames)
     mixed = list(frames)
     rng.shuffle(mixed)
     return Kinds({name: frames[name] for name in mixed}, families)
@@ -116,13 +117,17 @@ def lead_with_ids(rng: random.Random, several: Kinds) -> None:
         parts = several.frames[family.name]["parts"] if family.name else {}
         code = parts.get("code", {})
         ended = family.ended or family.name == "coded"
-        if code.get("role") != "message" or "group" in parts or ended or rng.random() < 0.1:
+        one_way = "coding" in several.frames.get(family.name, {}) and _is_one_way(parts)
+        if code.get("role") != "message" or "group" in parts or ended or one_way or rng.random() < 0.1:
             continue
         size = int(code["type"][1:]) // 8
         starts = {number.to_bytes(size, "big")[:1] for number in family.ids}
         starts |= {number.to_bytes(size, "little")[:1] for number in family.ids}
         others = [each["parts"] for name, each in several.frames.items() if name != family.name]
-        if any(bytes.fromhex(next(iter(each.values())))[:1] in starts for each in others):
+        codings = [each.get("coding", {}) for each in several.frames.values()]
+        inserted = [bytes.fromhex(each["insert"]) for each in codings if "insert" in each]
+        begun = [bytes.fromhex(next(iter(each.values())))[:1] for each in others] + inserted
+        if not starts.isdisjoint(begun):
             continue
         del parts["start"]
         rest = {name: spec for name, spec in parts.items() if name != "code"}
@@ -133,9 +138,13 @@ def lead_with_ids(rng: random.Random, several: Kinds) -> None:
                     spec[key] = [name for name in ("code", *rest) if name in spec[key]] + seeds or ["code"]
         parts.clear()
         parts |= {"code": code, **rest}
+        coding = several.frames[family.name].get("coding")
+        if coding is not None and "checked" not in coding:
+            coding["over"] = [each for each in coding.get("over", rest) if each != "code"]
         if not family.shape.most and size == 1 and not {*rest} - {"crc", "also", "second", "stop"}:
             parts.clear()
             parts |= {"code": code, "inverse": {"type": "u8", "equals": "~code"}}
+            several.frames[family.name].pop("coding", None)
             family.shape.seeds = {}
         return
 
@@ -182,6 +191,50 @@ def _coded(rng: random.Random, frames: Doc, lead: str, bus: str) -> Family:
         parts["close"]["value"] = "80"
     frames["coded"] = {"parts": parts, "coding": coding}
     return Family(shape, "coded")
+
+
+def _add_codings(rng: random.Random, frames: Doc) -> None:
+    """Codings of some kinds of frame whose end a length or the message tells."""
+    for spec in frames.values():
+        parts: Doc = spec["parts"]
+        roles = {each.get("role") for each in parts.values() if isinstance(each, dict)}
+        if "coding" in spec or "terminator" in roles or len(parts) == 1 or rng.random() < 0.65:
+            continue
+        first, *names = parts
+        lead = bytes.fromhex(parts[first])
+        codings: list[Doc] = [
+            {"escape": "7D", "xor": "20", "of": ["7E", "7D"]},
+            {"replace": {"C0": "DB DC", "DB": "DB DD"}},
+            {"digits": "hex"},
+            {"pair": "complement"},
+            {"add": "21"},
+        ]
+        if len(lead) > 1:
+            insert = rng.choice(("00", "5B"))
+            codings += 3 * [{"insert": insert, "after": f"{lead[0]:02X}"}]
+        if _counts_sent(parts):
+            codings += [{"add": "33", "checked": "after"}]
+            codings += [{"insert": "00", "after": "A5 5A", "checked": "after"}] if len(lead) < 2 else []
+            codings += [{**codings[5], "checked": "after"}] if len(lead) > 1 else []
+        coding = dict(rng.choice(codings))
+        if "checked" not in coding and "data" in parts and not _is_one_way(parts) and rng.random() < 0.4:
+            data = names.index("data")
+            coding["over"] = names[rng.randint(0, data) : rng.randint(data + 1, len(names))]
+        spec["coding"] = coding
+
+
+def _is_one_way(parts: Doc) -> bool:
+    """Whether some parts are only in the frames of one direction."""
+    return any("if" in each for each in parts.values() if isinstance(each, dict))
+
+
+def _counts_sent(parts: Doc) -> bool:
+    """Whether the length of a frame and its check value can be about the coded payload."""
+    length = parts.get("length")
+    if length is None or "again" in parts or not {"data", "crc"} <= parts.keys():
+        return False
+    most = int(parts["data"]["size"].split("..")[1])
+    return length["type"] != "u8" or 2 * most + len(parts) * 4 < 256
 
 
 def _add_values(rng: random.Random, frames: Doc, families: list[Family]) -> None:

@@ -10,7 +10,7 @@ from tests.support.whole.reference import document
 from tests.support.whole.reference.fields import Fields, bits_of
 from tests.support.whole.reference.frames import Frame, NeedMore, Refused, has
 from tests.support.whole.reference.layouts import Message
-from tests.support.whole.reference.notation import Direction, Doc, part_doc
+from tests.support.whole.reference.notation import Direction, Doc, part_doc, stuffed
 from tests.support.whole.reference.receivers import Event, Receiver, Searcher
 from tests.support.whole.reference.values import Raw, Wrong, put
 
@@ -146,6 +146,7 @@ def _whole(spec: Doc) -> Doc:
     """The parts of a kind, with an empty payload before what follows it if it has none."""
     parts, more = dict(spec["parts"]), {key: spec[key] for key in ("coding",) if key in spec}
     roles = [part_doc(each)["role"] for each in parts.values()]
+    stuffed(more, parts)
     if "payload" in roles:
         return {"parts": parts, **more}
     name = "payload"
@@ -182,6 +183,8 @@ class KindSearcher(Receiver):
             for name, frame in frames.items()
         ]
         self.buffer, self.start, self.ended = b"", 0, False
+        #: The inserted byte that may follow the last frame.
+        self.swallow = b""
 
     def whole(self, wire: bytes) -> Event:
         """The event of bytes that are exactly one frame. Raises Wrong."""
@@ -205,8 +208,12 @@ class KindSearcher(Receiver):
 
     def _scan(self) -> Iterator[Event]:
         while self.buffer:
+            swallow, self.swallow = self.swallow, b""
+            if swallow == self.buffer[:1]:
+                self._advance(1)
+                continue
             try:
-                event, size = self._attempt()
+                event, size, self.swallow = self._attempt()
             except NeedMore:
                 if not self.ended:
                     return
@@ -219,12 +226,13 @@ class KindSearcher(Receiver):
                 yield event
                 self._advance(size)
 
-    def _attempt(self) -> tuple[Event, int]:
+    def _attempt(self) -> tuple[Event, int, bytes]:
         for each in self.searchers:
             if any(first.startswith(self.buffer[: len(first)]) for first in each.frame.starts):
                 each.buffer, each.start, each.at = self.buffer, self.start, self.at
-                event, size, _ = each.attempt()
-                return event, size
+                event, size, pending = each.attempt()
+                stuffing = each.frame.stuffing
+                return event, size, bytes([stuffing.insert]) if stuffing and pending else b""
         raise Refused("frame", told=False)
 
     def _advance(self, size: int) -> None:

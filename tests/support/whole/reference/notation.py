@@ -90,11 +90,11 @@ def load(text: str) -> Doc:
         if isinstance(spec, dict) and spec.get("role") in {"idle", "break"}
     ]:
         document["frame"]["silent"] = parts.pop(name).get("alone", False)
-    _stuffed(document.get("frame", {}), parts)
+    stuffed(document.get("frame", {}), parts)
     return document
 
 
-def _stuffed(frame: Doc, parts: Doc) -> None:
+def stuffed(frame: Doc, parts: Doc) -> None:
     """Write the insertion into a frame that is read from left to right as stuffing."""
     coding = frame.get("coding")
     if isinstance(coding, dict) and "add" in coding and coding.get("checked") == "after":
