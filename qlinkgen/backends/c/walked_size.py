@@ -123,7 +123,7 @@ class _Sizer:
             f"    ++{count};",
             "}",
             *refusal([f"{count} > {most}U"], f"{upper}_ERROR_LENGTH"),
-            f"if ((at + {count}) == available) {{",
+            f"if ((at + {count}) >= available) {{",
             "    *size = (*size > available) ? *size : (available + 1U);",
             f"    return {upper}_ERROR_TRUNCATED;",
             "}",
