@@ -15,6 +15,7 @@ from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Event, Frame
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.peer import PeerEngine
+from qlinkgen.link.poll import Key, Polled, Poller
 from qlinkgen.link.slave import Node as Handlers
 from qlinkgen.link.transaction import Accepts
 from qlinkgen.transport.aio import AsyncMaster
@@ -69,6 +70,27 @@ class AsyncCalls(Watched, AsyncMaster):
     async def tell(self, request: Framed) -> None:
         """Send a request without a response."""
         await self.transact(request)
+
+    def poll(
+        self, periods: Mapping[Key, float] | Poller, *, requests: Mapping[Key, Framed] | None = None
+    ) -> AsyncGenerator[Polled, None]:
+        """Ask periodically, and return an iterator over the outcomes: time, node, command, response or error.
+
+        The bus is asked while the iterator is advanced, and is free for others in between. Silent nodes are
+        asked less often. Close the iterator to end it.
+
+        Args:
+            periods: seconds between two requests by node and command, such as {(3, "get_zones"): 0.5}; the
+                node is None where frames have no address. Or a `Poller`, which has statistics.
+            requests: those of commands that need values, by node and command.
+
+        Raises:
+            ValueError: a period is not above 0, or there is none.
+            KeyError: an unknown command.
+            TypeError: the request of a command needs values.
+        """
+        poller = periods if isinstance(periods, Poller) else Poller(self.codec, periods, requests=requests)
+        return self.iterate(poller.run())
 
 
 class AsyncBus(AsyncCalls):

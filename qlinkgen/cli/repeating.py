@@ -50,7 +50,7 @@ def repeat(
     poller = Poller(codec, {key: period}, requests={key: request}, policy=None)
     start = master.port.now()
     try:
-        with StopSignals(_stop), closing(master.poll(poller)) as outcomes:
+        with StopSignals(_stop), closing(master.iterate(poller.run())) as outcomes:
             for number, polled in enumerate(outcomes, 1):
                 for record in records(protocol, polled):
                     click.echo(jsonlines.line({"at": round(polled.time - start, 6), **record}))

@@ -27,7 +27,7 @@ _IN_FUNCTIONS = frozenset(
 _IN_CALLS = frozenset(
     """ask ask_any ask_each ask_many ask_steps ask_stream tell handle number axis bool bytes dict float int
     list str tuple type accepts after_fork bus close codec engine iterate logger node on_event on_frame open
-    port run serve stream transact transaction usual_echo watch""".split()  # noqa: SIM905
+    poll port run serve stream transact transaction usual_echo watch""".split()  # noqa: SIM905
 )
 #: Classes, constants and imports of a codec, and constants in the body of a message class.
 _IN_MODULE = frozenset(

@@ -16,7 +16,6 @@ from typing import Any, Self, TypeVar, assert_never
 
 from qlinkgen.errors import PortLost
 from qlinkgen.link.events import Event
-from qlinkgen.link.poll import Polled, Poller
 from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Report, Runner, Tell
 from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.transport.conversation import Asker, MasterDriver, conversation, stream_of
@@ -143,10 +142,6 @@ class AsyncMaster(MasterDriver):
     def iterate(self, procedure: Procedure[Outcome]) -> AsyncGenerator[Report, None]:
         """Run a procedure as an iterator over its reports; it advances with the iterator."""
         return self._each(Runner(procedure))
-
-    def poll(self, poller: Poller) -> AsyncGenerator[Polled, None]:
-        """Ask periodically, as an iterator over the outcomes; it waits, and asks, while it is advanced."""
-        return self.iterate(poller.run())
 
     async def _each(self, runner: Runner[Outcome]) -> AsyncGenerator[Report, None]:
         try:

@@ -10,7 +10,6 @@ from typing import Any, Self, assert_never
 
 from qlinkgen.errors import PortLost
 from qlinkgen.link.events import Event
-from qlinkgen.link.poll import Polled, Poller
 from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Report, Runner, Tell
 from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.transport.conversation import Asker, MasterDriver, conversation, stream_of
@@ -148,10 +147,6 @@ class BlockingMaster(MasterDriver):
             return runner.result
         finally:
             runner.close()
-
-    def poll(self, poller: Poller) -> Generator[Polled]:
-        """Ask periodically, as an iterator over the outcomes; it waits, and asks, while it is advanced."""
-        yield from self.iterate(poller.run())
 
     def _do(self, runner: Runner[Outcome]) -> Tell | None:
         """Perform a step of a procedure; return a report."""

@@ -8,6 +8,8 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import closing
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ import pytest
 from qlinkgen.errors import NoReply, PortLost, Refused
 from qlinkgen.link import Refusal
 from qlinkgen.link.events import Frame, Sent
+from qlinkgen.link.poll import Key, Poller
 from qlinkgen.protocols.mc1231a import Host
 from qlinkgen.pytest_plugin import BusPairs, bus_pair
 from qlinkgen.sim import FaultPlan
@@ -80,6 +83,34 @@ def test_faults_are_repeated_and_a_silent_node_goes_offline(bus_pair: BusPairs) 
             read(pair.master.node(99), 1)
     with pytest.raises(NoReply, match="not sent"):
         read(pair.master.node(99), 1)
+
+
+def test_polling(bus_pair: BusPairs) -> None:
+    """Each request has its own period; a refusal is an outcome; a silent node does not delay the others."""
+    periods: dict[Key, float] = {
+        (NODE, "read_holding_registers"): 0.1,
+        (NODE, "read_coils"): 0.5,
+        (99, "read_holding_registers"): 0.1,
+    }
+    requests = {
+        (node, name): codec.COMMANDS[name].request(node=node, start=0, quantity=1) for node, name in periods
+    }
+    pair = bus_pair(modbus.Bus, Registers(), attempts=1)
+    poller = Poller(codec, periods, requests=requests)
+    start = pair.master.port.now()
+    with closing(pair.master.poll(poller)) as outcomes:
+        found = list(takewhile(lambda each: each.time - start < 10, outcomes))
+    good = [each for each in found if each.node == NODE and not each.error]
+    assert [each.outcome.registers for each in good] == [[0]] * len(good)
+    assert len(good) > 60
+    assert all(isinstance(each.error, Refused) for each in found if each.command == "read_coils")
+    assert sum(each.node == 99 for each in found) < 10
+    with closing(pair.master.poll({(NODE, "read_holding_registers"): 1.0}, requests=requests)) as outcomes:
+        time, node, command, outcome = next(outcomes)
+    assert (node, command, outcome.registers) == (NODE, "read_holding_registers", [0])
+    assert time > start + 10
+    with pytest.raises(KeyError, match="nonsense"):
+        pair.master.poll({(NODE, "nonsense"): 1.0})
 
 
 def test_frames_are_told_on_both_sides() -> None:

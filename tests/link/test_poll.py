@@ -27,7 +27,7 @@ def polled(
     """The outcomes up to a time on a line with some nodes."""
     _, port, stations = bus(*nodes, baud=baud)
     poller = Poller(qlink, periods, **options)
-    with closing(BlockingMaster(make(baud=baud), port).poll(poller)) as outcomes:
+    with closing(BlockingMaster(make(baud=baud), port).iterate(poller.run())) as outcomes:
         found = list(takewhile(lambda each: each.time < until, outcomes))
     return found, poller.statistics, stations
 
@@ -75,7 +75,7 @@ def test_a_silent_node_is_left_alone_and_comes_back() -> None:
     quiet = late.handle
     late.handle = lambda request, now: None if now < 2.0 else quiet(request, now)  # type: ignore[method-assign]
     poller = Poller(qlink, periods, requests=requests, policy=POLICY)
-    with closing(BlockingMaster(make(), port).poll(poller)) as outcomes:
+    with closing(BlockingMaster(make(), port).iterate(poller.run())) as outcomes:
         found = list(takewhile(lambda each: each.time < 4.0, outcomes))
     assert wire is port.wire
     failed = [each.time for each in found if each.error]
@@ -97,7 +97,7 @@ def test_the_same_on_asyncio() -> None:
         _, port, _ = bus(3)
         poller = Poller(qlink, {(3, "motor_position"): 0.1})
         found = []
-        async with aclosing(AsyncMaster(make(), port).poll(poller)) as outcomes:
+        async with aclosing(AsyncMaster(make(), port).iterate(poller.run())) as outcomes:
             async for each in outcomes:
                 found.append(each)
                 if len(found) == 5:
