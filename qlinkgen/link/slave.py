@@ -24,6 +24,7 @@ from qlinkgen.link.codec import (
 from qlinkgen.link.echo import EchoCanceller
 from qlinkgen.link.events import Frame, heard
 from qlinkgen.link.gaps import Gap, break_of, silence_of
+from qlinkgen.link.kept import kept_of
 from qlinkgen.link.many import nodes_asked
 from qlinkgen.link.numbering import numbering_of, repeat, repeated_of
 from qlinkgen.link.slave_dialogue import PENDING, Answers, Handling, Refusal, SlaveDialogue
@@ -62,6 +63,7 @@ class SlaveCounters:
 
     Attributes:
         requests: requests to this node.
+        repeats: those among them that repeat the one before, and get its answer once more.
         broadcasts: requests to all nodes.
         answers: responses handed to the port.
         replaced: responses discarded because another frame arrived before they were sent.
@@ -72,10 +74,14 @@ class SlaveCounters:
             here.
     """
 
-    __slots__ = ("answers", "broadcasts", "damaged", "foreign", "replaced", "requests", "unknown", "untimely")
+    __slots__ = (
+        "answers", "broadcasts", "damaged", "foreign", "repeats", "replaced", "requests", "unknown",
+        "untimely",
+    )  # fmt: skip
 
     def __init__(self) -> None:
         self.requests = 0
+        self.repeats = 0
         self.broadcasts = 0
         self.answers = 0
         self.replaced = 0
@@ -149,6 +155,7 @@ class SlaveEngine:
         self._encode = codec.encode
         self.numbering = numbering_of(codec)
         self._repeated = repeated_of(codec)
+        self._kept = kept_of(codec)
         self._broadcast = codec.BUS.broadcast
         self._addressed = codec.BUS.first_node is not None
         self._answering = {
@@ -180,8 +187,7 @@ class SlaveEngine:
         idle = silence_of(codec, self._byte_time)
         self._gap = Gap(idle + host_slack if idle else 0.0)
         self._echo = EchoCanceller(echo)
-        self._last = b""
-        self._answer = b""
+        self._last = self._answer = b""
         self._further: list[bytes] = []  #: answers that follow it
         self._due = 0.0
         self._in_turn = False  #: the answer follows those of other nodes
@@ -249,34 +255,63 @@ class SlaveEngine:
         if self._answer and self._in_turn and address not in (self._broadcast, self.node.number):
             self.counters.foreign += 1  # the answer of an earlier node
             return
-        if self._unknown is not None:
-            self._unknown.known()
-        if self._answer:  # the master no longer waits for it, as it sends again
-            self.counters.replaced += 1
-            self._answer = b""
-            self._further = []
+        self._replace()
         if before is None or address not in (None, self._broadcast, self.node.number):
             self.counters.foreign += 1
             return
         if address is not None and address == self._broadcast:
             self.counters.broadcasts += 1
-            self._leave()
-            response = self._begun(request, self._handled(request, now))
+            response = self._begun(request, self._told(request, now))
             if not self._answering[type(request)]:
                 return
         else:
             self.counters.requests += 1
-            handled = self._handled if not self._dialogues else self._in_dialogue
-            response = self._begun(request, handled(request, now))
+            if self._kept is not None and (again := self._kept.again(request)):
+                self._answer_again(request, again, now)
+                return
+            response = self._begun(request, self._asked(request, now))
         self._request = request
         self._in_turn = before > 0
         if self._flows and self._flows.next():
             self._due = max(self._due, now + self._turnaround)
         if response is not None and response is not PENDING:
             self._queue(request, response, now)
-            inserted = self._encode(request)[-1:] != self._last
-            self._due = now + self._turnaround + (self._byte_time if inserted else 0.0)
-            self._due += self._turns(request, before) + self.delays.get(type(request), 0.0)
+            self._due = self._ready(request, now) + self._turns(request, before)
+
+    def _told(self, request: Framed, now: float) -> Answers:
+        """Return the answers to a broadcast."""
+        self._leave()
+        if self._kept is not None:
+            self._kept.told(request)
+        return self._handled(request, now)
+
+    def _asked(self, request: Framed, now: float) -> Answers:
+        """Return the answers to a request to this node."""
+        if self._kept is not None:
+            self._kept.heard(request)
+        return self._in_dialogue(request, now) if self._dialogues else self._handled(request, now)
+
+    def _ready(self, request: Framed, now: float) -> float:
+        """The time of an answer: after the byte that may be inserted after the request, and its delay."""
+        inserted = self._encode(request)[-1:] != self._last
+        ready = now + self._turnaround + (self._byte_time if inserted else 0.0)
+        return ready + self.delays.get(type(request), 0.0)
+
+    def _answer_again(self, request: Framed, frames: Sequence[bytes], now: float) -> None:
+        """Answer the repeat of a request like the request itself."""
+        self.counters.repeats += 1
+        self._request, self._in_turn = request, False
+        self._answer, *self._further = frames
+        self._due = self._ready(request, now)
+
+    def _replace(self) -> None:
+        """Drop an answer that is not sent yet: the master no longer waits for it, as it sends again."""
+        if self._unknown is not None:
+            self._unknown.known()
+        if self._answer:
+            self.counters.replaced += 1
+            self._answer = b""
+            self._further = []
 
     def _begun(self, request: Framed, response: Answers) -> Answers:
         """Begin or stop answers without an end; return what is sent once."""
@@ -349,6 +384,8 @@ class SlaveEngine:
             self._check(asked, each)
             self._fill(begun, each)
         self._further = [self._encoded(request, each) for each in several]
+        if self._kept is not None:
+            self._kept.answered(request, self._further)
         self._await_next(self._further, now)
         self._answer = self._further.pop(0) if several else b""
 

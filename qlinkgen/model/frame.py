@@ -72,10 +72,14 @@ class Checksum:
 
 @dataclass(frozen=True, slots=True)
 class Counting:
-    """What a counter counts: new requests to each node, or frames; and whether answers repeat it."""
+    """What a counter counts: new requests to each node, or frames; and whether answers repeat it.
+
+    ``again``: a slave answers a request with the number of the one before with its last answer.
+    """
 
     per_frame: bool = False
     echo: bool = False
+    again: bool = False
     #: Tests of pieces of the message id, which hold for the messages that it counts; () for all.
     when: Condition = ()
 

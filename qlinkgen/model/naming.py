@@ -117,6 +117,7 @@ _C_HANDLERS = frozenset(
         "streaming",
         "turn",
         "due",
+        "kept",
     }
 )
 #: Names that the header itself defines, or their beginnings, without the prefix of the protocol.

@@ -139,6 +139,13 @@ class Protocol:
             return False
         return frame.counts(message.id) and any(each.name == counter.name for each in self.beside(message))
 
+    def keeps(self, command: Command) -> bool:
+        """Whether a slave keeps its answer to a command, for a request with the same number."""
+        counting = self.counter.counting if self.counter else None
+        if counting is None or not counting.again or not self.counts(command.request):
+            return False
+        return command.response is not None and command.many is None and not command.steps
+
     @property
     def master(self) -> PartBits | None:
         """The number of the master among the values of frames, None if there is none."""

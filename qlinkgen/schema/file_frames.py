@@ -92,6 +92,11 @@ class PartBitSpec(BitSpec):
     )
     per: Literal["request", "frame"] = Field(default="request", description="What a counter counts")
     echo: StrictBool = Field(default=False, description="Answers repeat the counter of their request")
+    repeats: Literal["handled", "answered"] = Field(
+        default="handled",
+        description="What a slave does with a request that has the number of the one before: handle it, or "
+        "answer it with its last answer",
+    )
     const: Consts | None = Field(default=None, description="Legal values, the first of which is sent")
     values: Directions | None = Field(
         default=None, description="The value for each direction; others are of replies with `if`"
@@ -143,6 +148,11 @@ class PartSpec(Fact):
     )
     per: Literal["request", "frame"] = Field(default="request", description="What a counter counts")
     echo: StrictBool = Field(default=False, description="Answers repeat the counter of their request")
+    repeats: Literal["handled", "answered"] = Field(
+        default="handled",
+        description="What a slave does with a request that has the number of the one before: handle it, or "
+        "answer it with its last answer",
+    )
     equals: str | None = Field(
         default=None, description="Earlier part with the same value; ~PART, PART + N: derived from it"
     )

@@ -91,7 +91,8 @@ class PieceBuilder:
     def _counted(self, bits: PartBits, spec: PartSpec | PartBitSpec, path: Path) -> PartBits:
         """The bits of a value, which may be a counter."""
         if spec.role != "counter":
-            for key in spec.model_fields_set & {"per", "echo"} if isinstance(spec, PartBitSpec) else ():
+            keys = {"per", "echo", "repeats"} if isinstance(spec, PartBitSpec) else set()
+            for key in spec.model_fields_set & keys:
                 what = f"'{key}' has no effect on a value that is not a counter"
                 self._fault("not-applicable", (*path, key), what, "remove it, or add role: counter")
             return bits
@@ -99,7 +100,12 @@ class PieceBuilder:
         if number is None or number.signed or number.meaning is not None or number.scaling is not None:
             what = f"{bits.name} cannot count"
             self._fault("bad-frame", path, what, "use a plain unsigned integer")
-        return replace(bits, counting=Counting(spec.per == "frame", spec.echo))
+        again = spec.repeats == "answered"
+        if again and spec.per == "frame":
+            what = f"each frame has another {bits.name}, so none tells that a request is repeated"
+            hint = "remove repeats, or let the counter count requests"
+            self._fault("not-applicable", (*path, "repeats"), what, hint)
+        return replace(bits, counting=Counting(spec.per == "frame", spec.echo, again))
 
     def inside(
         self, specs: Mapping[str, PartBitSpec], container: Scalar, ways: Sequence[str], path: Path

@@ -19,6 +19,7 @@ from qlinkgen.backends.c.describe import WIDTH
 from qlinkgen.backends.c.example import example_lines, option_lines
 from qlinkgen.backends.c.forms import Helper
 from qlinkgen.backends.c.frames import FrameSection, View, frame_section
+from qlinkgen.backends.c.kept import kept
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.messages import Beside, MessageWriter, Rounding, nearest_helpers
 from qlinkgen.backends.c.names import Names
@@ -314,6 +315,7 @@ class Header:
             dialogues=dispatch.dialogues(self._names, commands) if listens else [],
             counter=counter(self._plan, self._names, section.view.id_type) if role != "slave" else None,
             before=max((each.listed for each in slave if each.listed), key=attrgetter("most"), default=None),
+            kept=kept(self._plan, self._names) if slave else None,
             streams=[each.begins for each in slave if each.begins],
             several=several(self._names, commands, self._kept) if listens else [],
         )

@@ -103,6 +103,7 @@ class KitView:
     frame_id_type: str
     checks: list[str]
     turned: list[str]
+    keeps: bool
 
 
 class Kit:
@@ -182,6 +183,7 @@ class Kit:
             has_handlers=any(each.slave_member for each in entries),
             has_callbacks=any(each.callback_member for each in entries),
             checks=sorted({each.received_as for each in entries if each.framed and not each.turned}),
+            keeps=any(map(self._plan.protocol.keeps, self._plan.commands)),
             turned=[each.constant for each in entries if each.turned and each.decoded],
         )
 

@@ -244,9 +244,10 @@ class ClassBuilder:
         return ["COUNTER = None"]
 
     def _restart(self, message: MessagePlan) -> list[str]:
-        """The constant of a request after which the counter begins anew."""
+        """The constants of a request after which the counter begins anew, or whose answer is kept."""
         commands = [each for each in self._plan.protocol.commands if each.request is message.message]
-        return [f"RESTART = {each.restart}" for each in commands if each.restart is not None]
+        restart = [f"RESTART = {each.restart}" for each in commands if each.restart is not None]
+        return restart + (["KEPT = True"] if any(map(self._plan.protocol.keeps, commands)) else [])
 
     def _kind(self, message: MessagePlan) -> list[str]:
         """What tells the kind of its frame, and whether that has an address, values and a counter."""

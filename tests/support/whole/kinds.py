@@ -241,6 +241,8 @@ def _add_values(rng: random.Random, frames: Doc, families: list[Family]) -> None
     """Values of some kinds of frame, and an attribute of messages that some check values cover."""
     known: Doc = {"status": draw_value(rng), "component": draw_value(rng)}
     counter: Doc = {"role": "counter", **rng.choice(({}, {"per": "frame"}))}
+    if "per" not in counter and random.Random(f"repeats {rng.getstate()!r}").random() < 0.5:
+        counter["repeats"] = "answered"
     known["sequence"] = {**counter, "type": rng.choice(("u8", "u16"))}
     if rng.random() < 0.3:
         bits = {"toggle": {**counter, "at": 5}, "grade": {"at": "0..2", "signed": True}, "ready": 7}

@@ -99,6 +99,9 @@ class Mixture:
         if rng.random() < 0.75:
             return
         counter: Doc = {"role": "counter"} | rng.choice(({}, {"echo": True}, {"per": "frame"}))
+        # Drawn from another source: the schemas of earlier seeds stay what they are.
+        if "per" not in counter and random.Random(f"repeats {rng.getstate()!r}").random() < 0.5:
+            counter["repeats"] = "answered"
         if "head" not in parts or rng.random() < 0.5:
             parts["sequence"] = {**counter, "type": rng.choice(("u8", "u16"))}
         elif (last := int(parts["head"]["type"][1:]) - 1) not in _used(parts["head"]):

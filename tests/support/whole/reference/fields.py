@@ -197,10 +197,8 @@ class Fields:
                 self._member(key, spec["bits"][key]) for key, role, *_ in bits_of(spec) if role == "value"
             )
             return Slot(name, self._number(spec["type"], spec)), members
-        slot = self._slot(
-            name,
-            self._resolved({key: each for key, each in spec.items() if key not in ("role", "per", "echo")}),
-        )
+        facts = ("role", "per", "echo", "repeats")
+        slot = self._slot(name, self._resolved({key: each for key, each in spec.items() if key not in facts}))
         if isinstance(slot.kind, Packed):
             return slot, slot.kind.members
         kind = slot.kind
