@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
@@ -15,7 +15,7 @@ from qlinkgen.link.codec import Framed
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import Json
 from qlinkgen.sim import SimulationError
-from qlinkgen.sim.generic import GenericNode, required_values
+from qlinkgen.sim.generic import GenericNode
 from qlinkgen.sim.memory import Memory
 from qlinkgen.sim.refusals import Refusals, command_named
 from qlinkgen.sim.values import Values
@@ -78,7 +78,7 @@ class Nodes:
             }
         except SimulationError as error:
             raise Failure(str(error)) from None
-        self._check()
+        self._check(values)
 
     def node(self, number: int = 0) -> GenericNode:
         """Make a node."""
@@ -91,18 +91,16 @@ class Nodes:
             refusals=self._refusals,
         )
 
-    def _check(self) -> None:
-        """Refuse values that are only wrong together, by an answer to each command."""
+    def _check(self, given_to: Collection[str]) -> None:
+        """Refuse values that are only wrong together, by an answer to each command that has some."""
         nodes = self._protocol.bus.nodes
         node = GenericNode(self._codec, nodes[0] if nodes else 0, self._plan, values=self._values)
         for command in self._codec.COMMANDS.values():
-            if command.response is None or command.steps or command.many is not None:
+            answer = command.response
+            if answer is None or not {command.name, answer.NAME}.intersection(given_to):
                 continue
-            given = required_values(command.request)
-            if command.request.ADDRESS:
-                given[command.request.ADDRESS] = node.number
             try:
-                self._codec.encode(node.handle(command.request(**given), 0.0))
+                self._codec.encode(node.example(command))
             except self._codec.EncodeError as error:
                 raise Failure(str(error)) from None
 

@@ -113,6 +113,16 @@ class GenericNode:
             return self._answer(command.response, request, command.echoes, sizes)
         return self._several(command, command.many, request, sizes)
 
+    def example(self, command: Command) -> Message:
+        """Return the response of a command that has one, to the request with the smallest legal values."""
+        assert command.response is not None
+        values = required_values(command.request)
+        if address := command.request.ADDRESS:
+            values[address] = self.number
+        make: Callable[..., Framed] = command.request
+        request = make(**values)
+        return self._answer(command.response, request, command.echoes, _sizes(command, request))
+
     def _several(
         self, command: Command, many: Many, request: Framed, values: dict[str, object]
     ) -> list[Message] | Iterator[Message]:

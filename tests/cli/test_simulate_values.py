@@ -8,6 +8,7 @@ import pytest
 
 from tests.cli.conftest import Run
 from tests.cli.wire import CALM, objects, simulated
+from tests.sim.test_values import SCHEMA
 
 
 def test_values_of_the_command_line_and_a_file(thermo: Path, tmp_path: Path, qlinkgen: Run) -> None:
@@ -59,6 +60,14 @@ def test_wrong_files(text: str, error: str, thermo: Path, tmp_path: Path, qlinkg
     assert (done.code, done.out) == (2, "")
     assert f"{file}" in done.err or "delay of" in done.err
     assert error in done.err
+
+
+def test_values_that_the_encoder_refuses(tmp_path: Path, qlinkgen: Run) -> None:
+    file = tmp_path / "oven.yaml"
+    file.write_text(SCHEMA)
+    done = qlinkgen("simulate", file, "--value", "get_status.label=123456789")
+    assert (done.code, done.out) == (2, "")
+    assert "label: '123456789' cannot be sent; give text of 0..8 seven-bit characters" in done.err
 
 
 def test_for_schemas_with_generic_nodes_only(qlinkgen: Run) -> None:
