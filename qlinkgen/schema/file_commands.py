@@ -250,7 +250,9 @@ class ReplySpec(Fact):
         default=None, description="Character between the fields, which are texts; none: there is none"
     )
     when: AnyCondition | None = Field(
-        default=None, alias="if", description="Value of the direction of its frames: {way: refused}"
+        default=None,
+        alias="if",
+        description="What picks it: a value of the direction, of the frame, or of a field of the response",
     )
     fields: Fields = Field(description="Its fields, in wire order")
     means: Annotated[MeansSpec, ShortForm("default", "string")] = Field(

@@ -27,6 +27,7 @@ from qlinkgen.schema.notation import version as as_version
 from qlinkgen.schema.part_types import place_part_types
 from qlinkgen.schema.reading import read_regular, reason_of
 from qlinkgen.schema.report import Reporter, did_you_mean
+from qlinkgen.schema.response_forms import with_forms
 from qlinkgen.schema.seeds import check_references, check_types
 from qlinkgen.schema.source import Data, parse
 from qlinkgen.schema.structure import check_structure
@@ -151,7 +152,7 @@ def _build(
         return None
     whole = without_choices(whole, report)
     check_lifetimes(whole, report)
-    file = in_version(whole, version)
+    file = with_forms(in_version(whole, version), report)
     text += f"\nversion {version}" if version else ""
     payload_max = payload_bounds(file)[1]
     types = TypeBuilder(file, report, payload_max)

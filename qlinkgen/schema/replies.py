@@ -13,7 +13,7 @@ from qlinkgen.schema.file_commands import AnswerSpec, Means, MeansSpec, MessageS
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kind_messages import AnyMessages
 from qlinkgen.schema.messages import Written
-from qlinkgen.schema.notation import AnswerId, Duration, shown, whole_range
+from qlinkgen.schema.notation import AnswerId, Duration, Wanted, shown, wanted
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
@@ -164,8 +164,9 @@ class ReplyBuilder:
         others = {} if ways is None else {each: 0 for each in ways.directions if each not in _TAKEN}
         if ways is None or len(when) > 1 or test.field != ways.name or test.negated or len(test.wanted) > 1:
             named = f"the direction, as in {{{ways.name}: NAME}}" if ways else "a part with role: direction"
-            what = f"only a value of the direction can pick {written.name}"
-            self._report.error(_RULE, place, what, f"name {named}; or give it an id or means", needs=needs)
+            what = f"no value picks {written.name}"
+            hint = f"name {named}, or one value of the frame or of a field of the response; or give it an id"
+            self._report.error(_RULE, place, what, hint, needs=needs)
         elif (name := test.wanted[0].name) in others:
             return name
         else:
@@ -273,12 +274,15 @@ class ReplyBuilder:
         if key in members:
             return members[str(key)], members[str(key)], str(key)
         try:
-            first, last = whole_range(key)
+            value = wanted(key)
         except ValueError:
+            value = Wanted(str(key), name=str(key))
+        if value.name:
             what = f"{shown(key)} is not a value of the field"
             hint = did_you_mean(str(key), members, "write a number, a range or a name")
             self._report.error(_RULE, path, what, hint, of_key=True)
             return None
+        first, last = value.first, value.last
         if not number.minimum <= first <= last <= number.maximum:
             what = f"{shown(key)} is outside the range of the field"
             hint = f"use {number.minimum}..{number.maximum}"

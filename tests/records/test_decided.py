@@ -200,3 +200,61 @@ def test_a_slave_in_c(tmp_path: Path, require_tool: Callable[..., str]) -> None:
     given = [each.to_frame().hex() for each in asked]
     said = subprocess.run([program, *given], check=True, capture_output=True, text=True).stdout.split()
     assert said == [f"{each.to_frame().hex()}." for each in answers]
+
+
+FORMS = """\
+qlinkgen: 1
+protocol: {name: boot, title: Boot, revision: "1", source: Manual}
+byteorder: big
+frame:
+  parts:
+    start: 1B
+    size: {type: u16, counts: data}
+    code: {role: message, type: u8}
+    state: {type: u8, bits: {late: 0}, if: {direction: response}}
+    data: {role: payload, size: 0..32}
+    check: {type: u8, algorithm: xor8, over: [start, size, code, state, data]}
+bus: {kind: master_slave, baud: 9600, response_within: 10 ms}
+defaults: {repeat: safe}
+replies:
+  failed: {if: {status: 0x80..0xFF}, fields: {}}
+  wrong_check: {id: 0xB0, fields: {status: u8}, means: again}
+commands:
+  sign_on: {id: 1, request: {}, response: {status: u8, length: {type: u8, counts: name}, name: "text[0..8]"}}
+  load: {id: 6, request: {address: u32}, response: {status: u8}}
+  read:
+    id: 7
+    request: {}
+    response: {number: u8, value: u16}
+    replies: {late: {if: late, fields: {number: u8, wait: u8}, means: pending, within: 2 s}}
+"""
+
+
+def test_a_reply_picked_by_a_value_is_another_form_of_each_response() -> None:
+    targets = Targets(FORMS)
+    module, codec = targets.module, Codec(plan_of(targets.protocol))
+    both = [f"{name}.{way}" for name in ("load", "read", "sign_on") for way in ("request", "response")]
+    assert sorted(module.MESSAGES) == [*both, "wrong_check"]
+    rows: list[tuple[str, dict[str, Any], str]] = [
+        ("sign_on.response", {"status": 0, "name": b"AVR"}, "00 03 415652"),
+        ("sign_on.response", {"status": 0xC0, "name": None}, "C0"),
+        ("read.response", {"number": 4, "value": 7}, "04 0007"),
+        ("read.response", {"late": 1, "number": 4, "value": None, "wait": 9}, "04 09"),
+    ]
+    for name, values, payload in rows:
+        assert codec.decode(codec.encode(name, values), "response").payload == bytes.fromhex(payload)
+    engine = MasterEngine(module, Timing.of(module, host_slack=0.002))
+    refused = module.SignOnResponse(status=0xC0, name=None).to_frame()
+    outcome = drive(engine, module.SignOnRequest(), ((0.02, refused),))
+    assert isinstance(outcome.error, Refused)
+    late = module.ReadResponse(late=True, number=4, value=None, wait=9).to_frame()
+    answer = module.ReadResponse(number=4, value=7)
+    outcome = drive(engine, module.ReadRequest(), ((0.02, late), (1.5, answer.to_frame())))
+    assert outcome.reply is not None
+    assert outcome.reply.response == answer
+    wrong = module.WrongCheck(status=1).to_frame()
+    outcome = drive(
+        engine, module.LoadRequest(address=1), ((0.02, wrong), (0.04, module.LoadResponse().to_frame()))
+    )
+    assert outcome.reply is not None
+    assert (outcome.reply.response, len(outcome.sent)) == (module.LoadResponse(), 2)

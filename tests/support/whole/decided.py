@@ -31,6 +31,8 @@ def decide(rng: random.Random, shape: Shape, found: Doc) -> None:
     if not [*_values(parts)] and not {"stuffing", "coding"} & shape.frame.keys():
         _insert(rng, parts)
     known = [*_values(parts)]
+    for spec in found["commands"].values() if known else ():
+        _add_form(rng, spec, [each for each in known if each[3] in (None, "response")], shape.most)
     for direction, spec, fields in _several(found) if known else ():
         settled = {name for name, *_ in known} & {*(spec["id"] if isinstance(spec.get("id"), dict) else ())}
         if settled or "separator" in spec or "empty_request" in spec:
@@ -38,6 +40,25 @@ def decide(rng: random.Random, shape: Shape, found: Doc) -> None:
         named = [each for each in known if each[3] in (None, direction)]
         if named and rng.random() < 0.8:
             _condition(rng, fields, rng.choice(named), wide=shape.most >= _WIDE)
+
+
+def _add_form(rng: random.Random, spec: Doc, known: list[Value], most: int) -> None:
+    """Give the response of a command another form, which a value picks."""
+    response = spec.get("response")
+    if not known or most < _WIDE or not isinstance(response, dict) or rng.random() < 0.3:
+        return
+    fields = response.get("fields", response)
+    identified = isinstance(spec.get("id"), dict) or isinstance(response.get("id"), dict)
+    if identified or {"steps", "many", "separator"} & spec.keys() or "separator" in response:
+        return
+    if not all(_is_alone(name, each, fields) for name, each in fields.items()):
+        return
+    name, low, high, _ = rng.choice(known)
+    if low < high:
+        test = rng.choice((low, high, f"not {low}", f"{low}..{(low + high) // 2}"))
+        means = rng.choice(({}, {}, {"means": "again"}))
+        reply = {"if": {name: test}, "fields": {"reason": rng.choice(("u8", "bool", "u16"))}, **means}
+        spec["replies"] = {**spec.get("replies", {}), "otherwise": reply}
 
 
 def _insert(rng: random.Random, parts: Doc) -> None:
@@ -89,7 +110,7 @@ def _bounds(spec: Doc, bits: int) -> tuple[int, int] | None:
 def _several(found: Doc) -> Iterator[tuple[str, Doc, Doc]]:
     """The direction of a message, what states its id, and its fields."""
     for spec in found["commands"].values():
-        if "steps" in spec or "many" in spec:
+        if "steps" in spec or "many" in spec or "otherwise" in spec.get("replies", {}):
             continue
         response = spec.get("response")
         if isinstance(spec.get("request"), dict):

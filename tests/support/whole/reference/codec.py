@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from tests.support.whole.reference import document, text_ids, values
 from tests.support.whole.reference.asked import CARRIER, Asked, asked
 from tests.support.whole.reference.fields import Fields, bits_of
+from tests.support.whole.reference.forms import with_forms
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.kinds import Kinds, address_of
 from tests.support.whole.reference.layouts import Message
@@ -40,7 +41,7 @@ class Reference:
 
     def __init__(self, text: str) -> None:
         """Read the text of a schema."""
-        data = load(text)
+        data = with_forms(load(text))
         self.frame: Frame | Marked | Packets | Kinds
         self.requests: Frame | Marked | Packets | Kinds
         self.messages: tuple[Message, ...]
