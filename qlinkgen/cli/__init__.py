@@ -23,6 +23,7 @@ COMMANDS = {
     "decode": "Decode wire bytes: one JSON object per line.",
     "explain": "Describe every byte of a frame, and its errors.",
     "crc": "List check values, or find those that fit frames.",
+    "budget": "Compute the duration of a cycle of requests, and its share of the line.",
     "simulate": "Simulate nodes, a ring or a chip set on a new port, with optional faults.",
     "scan": "Find the nodes of a bus.",
     "send": "Send one request on a port and print its response, or one message into a ring.",

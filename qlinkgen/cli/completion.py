@@ -40,7 +40,7 @@ def _schemas_here() -> list[str]:
 
 def messages(context: click.Context, parameter: click.Parameter, incomplete: str) -> Items:  # noqa: ARG001
     """Complete a command or a message of the protocol."""
-    protocol = _loaded(context)
+    protocol = loaded_of(context)
     return [] if protocol is None else message_items(protocol, incomplete)
 
 
@@ -56,7 +56,7 @@ def assignments(context: click.Context, parameter: click.Parameter, incomplete: 
 
     bash splits words at "=", so there the field and "=" may be words of their own, before the value.
     """
-    message, protocol = _message(context), _loaded(context)
+    message, protocol = _message(context), loaded_of(context)
     if message is None or protocol is None:
         return []
     return assignment_items(protocol, message, context.params.get("assignments") or (), incomplete)
@@ -124,7 +124,7 @@ def _beginning(incomplete: str, words: Iterable[str]) -> Items:
     return [CompletionItem(word) for word in words if word.startswith(incomplete)]
 
 
-def _loaded(context: click.Context) -> Protocol | None:
+def loaded_of(context: click.Context) -> Protocol | None:
     """Return the protocol of the command line, None without a valid one."""
     from qlinkgen.cli.common import load_protocol  # noqa: PLC0415  # arguments are made before it
 
@@ -136,7 +136,7 @@ def _loaded(context: click.Context) -> Protocol | None:
 
 
 def _message(context: click.Context) -> Message | None:
-    protocol, name = _loaded(context), context.params.get("message")
+    protocol, name = loaded_of(context), context.params.get("message")
     try:
         return None if protocol is None or name is None else protocol.message(name)
     except KeyError:

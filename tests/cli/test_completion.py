@@ -59,6 +59,7 @@ def complete(qlinkgen: Run, thermo: Path, monkeypatch: pytest.MonkeyPatch) -> Co
         (["send", "qlink", "/dev/ttyUSB0", "motion", "seg"], ["segments="]),
         (["encode", "nonsense", "m"], []),
         (["encode", "qlink", "nonsense", "m"], []),
+        (["budget", "qlink", "1-4:motor_pos"], ["1-4:motor_position="]),
         (["doctor", "qlink", "/dev/ttyUSB0", "--ba"], ["--baud"]),
     ],
 )  # fmt: skip

@@ -29,6 +29,7 @@ RUNS: dict[str, tuple[list[str], int]] = {
     "decode": (["qlink", "a5a504210315e8"], 0),
     "explain": (["qlink", "a5a504210315e8"], 0),
     "crc": (["list"], 0),
+    "budget": (["qlink", "1:motion=1"], 0),
     "simulate": (["trio", "--nodes", "1"], 2),
     "scan": (["qlink", "/dev/null"], 1),
     "send": (["qlink", "/dev/null", "motor_position", "--node", "3"], 1),
