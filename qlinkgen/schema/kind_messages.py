@@ -92,7 +92,8 @@ class KindMessages:
     def single(self, name: str, spec: MessageSpec) -> Message:
         """A message without a response."""
         direction = sent_by(self._file, spec)
-        return self._of(spec.frame, ("messages", name), direction, name).single(name, spec)
+        kind = spec.frame or self._file.defaults.frame
+        return self._of(kind, ("messages", name), direction, name).single(name, spec)
 
     def _of(self, kind: str | None, path: Path, direction: Direction, whose: str) -> MessageBuilder:
         """The builder of the messages of a kind that go a direction; ``whose`` is the name of one."""

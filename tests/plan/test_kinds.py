@@ -362,3 +362,26 @@ def test_where_no_frame_goes_one_direction_those_of_the_other_are_passed_over() 
     asked = [event.kind for event in receiver(plan, "request").run(wire)]
     assert [fault.kind for fault in load_codec(protocol).StreamDecoder("request").feed(wire)] == asked
     assert load_codec(protocol, Options(role="slave")).StreamDecoder("request").feed(wire)
+
+
+def test_the_kind_of_the_defaults_is_that_of_messages_too() -> None:
+    protocol, faults = loads(
+        """\
+qlinkgen: 1
+protocol: {name: pair, revision: "1", source: Manual}
+frames:
+  first: {parts: {start: 11, code: {role: message, type: u8}, length: {type: u8, counts: data}, data: {role: payload, size: 0..4}}}
+  second: {parts: {start: 22, code: {role: message, type: u8}, length: {type: u8, counts: data}, data: {role: payload, size: 0..4}}}
+bus: {kind: link}
+defaults: {frame: second}
+commands: {}
+messages:
+  tell: {id: 1, fields: {level: u8}}
+  other: {id: 1, frame: first, fields: {level: u8}}
+""",  # noqa: E501
+        "pair.yaml",
+    )
+    assert protocol is not None, faults
+    codec = Codec(plan_of(protocol))
+    assert codec.encode("tell", {"level": 5}) == bytes.fromhex("22 01 01 05")
+    assert codec.encode("other", {"level": 5}) == bytes.fromhex("11 01 01 05")

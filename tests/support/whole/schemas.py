@@ -115,6 +115,8 @@ class _Maker:
         _begin_with_break(random.Random(f"break {self.seed}"), document)
         if not several:
             text_ids.draw(random.Random(f"text ids {self.seed}"), document)
+        if several:
+            _usual_kind(random.Random(f"usual {self.seed}"), document)
         maker.forget_unused(document)
         if not several:
             _name_parts(rng, document)
@@ -728,6 +730,20 @@ def _passed_over(document: Doc) -> bool:
     seeded = any(str(each).startswith("attribute.") for over in checks for each in over)
     plain = "to_unknown" not in document and not any("if" in spec for spec in specs)
     return ended and bool(checks) and not seeded and plain
+
+
+def _usual_kind(rng: random.Random, document: Doc) -> None:
+    """State the kind of frame of some commands and messages under defaults, where all state one."""
+    groups = ("commands", "messages", "replies")
+    specs = [spec for group in groups for spec in document.get(group, {}).values()]
+    if any("frame" not in spec for spec in specs):
+        return
+    kind = rng.choice([spec["frame"] for spec in specs])
+    document.setdefault("defaults", {})["frame"] = kind
+    for group in ("commands", "messages"):
+        for spec in document.get(group, {}).values():
+            if spec["frame"] == kind and rng.random() < 0.7:
+                del spec["frame"]
 
 
 def _name_parts(rng: random.Random, document: Doc) -> None:

@@ -75,7 +75,7 @@ class Kinds:
             yield from self._steps(name, merged, own)
         replies = {name: {"direction": "response", **each} for name, each in data.get("replies", {}).items()}
         for name, spec in (replies | data.get("messages", {})).items():
-            kinds = self._kinds(spec.get("frame"))
+            kinds = self._kinds(spec.get("frame", usual))
             built = document.single(
                 name, spec, self._document(kinds), self._fields(kinds), self._addressed(kinds)
             )
