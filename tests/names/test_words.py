@@ -234,9 +234,9 @@ def test_modules_can_be_called_so(tmp_path: Path) -> None:
     known = [word for word in words.names([*taken, *words.USUAL]) if len(word) <= 20]
     modules = []
     for word in known:
-        document = Document(word, commands=LEAST)
+        protocol = Document(word, commands=LEAST).protocol()
         for target in ("python", "bus"):
-            files = written(document, target, tmp_path / "wire")
+            files = saved(protocol, target, tmp_path / "wire")
             modules += [Path(each).stem for each in files if each.endswith(".py")]
     program = "".join(f"import wire.{name}\n" for name in sorted(set(modules)))
     command = [sys.executable, "-W", "error", "-c", program]
@@ -245,8 +245,13 @@ def test_modules_can_be_called_so(tmp_path: Path) -> None:
 
 def written(document: Document, target: str, folder: Path) -> list[str]:
     """Write the files of a target to one folder; returns their names."""
+    return saved(document.protocol(), target, folder)
+
+
+def saved(protocol: Protocol, target: str, folder: Path) -> list[str]:
+    """Write the files of a target for a protocol that has been read; returns their names."""
     folder.mkdir(exist_ok=True)
-    made = TARGETS[target].load()(document.protocol(), Options())
+    made = TARGETS[target].load()(protocol, Options())
     for path, text in made.items():
         (folder / Path(path).name).write_text(text, "utf-8")
     return [Path(path).name for path in made]
