@@ -33,6 +33,8 @@ _PRECEDENCE = (
 #: Words that an expression follows.
 _BEFORE_EXPRESSION = frozenset({"if", "elif", "while", "return", "raise", "assert", "not"})
 _ASSIGNMENTS = frozenset({"=", "+=", "-=", "|=", "^="})
+#: What a line of a class begins with where a method does.
+_METHODS = ("    def ", "    async def ", "    @")
 _NO_TOKENS = (tokenize.NEWLINE, tokenize.NL, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
 
 
@@ -88,18 +90,25 @@ def fitted(source: str) -> str:
 
 
 def _blocks(lines: Sequence[str]) -> list[tuple[int, int]]:
-    """Outermost statements with a long line, as ranges of lines: few, and all that is read by token."""
-    # Of all texts only the docstring of the module has lines that begin as statements do.
-    body = 0
-    if lines[0].startswith('"""'):
-        body = next(at for at, line in enumerate(lines) if line.endswith('"""')) + 1
-    starts = [at for at in range(body, len(lines)) if lines[at][:1] not in ("", *" )]}#")]
-    ends = [*starts[1:], len(lines)]
-    return [
-        (begin, end)
-        for begin, end in zip(starts, ends, strict=True)
-        if any(len(line) > WIDTH for line in lines[begin:end])
-    ]
+    """Outermost statements and methods with a long line, as ranges of lines: only they are read by token.
+
+    Long comments and docstrings cannot be split.
+    """
+    starts: list[int] = []
+    found: list[tuple[int, int]] = []
+    inside, long = False, False
+    for at, line in enumerate(lines):
+        text = line.lstrip(" ")
+        if inside or text.startswith('"""'):
+            inside = not (text.endswith('"""') and (inside or len(text) > 3))
+            continue
+        if line[:1] not in ("", *" )]}#") or line.startswith(_METHODS):
+            if long:
+                found.append((starts[-1], at))
+            starts.append(at)
+            long = False
+        long = long or (len(line) > WIDTH and text[0] != "#")
+    return [*found, (starts[-1], len(lines))] if long else found
 
 
 def _statements(source: str) -> Iterator[list[TokenInfo]]:
