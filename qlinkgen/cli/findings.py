@@ -26,6 +26,7 @@ from qlinkgen.plan.describe import (
 )
 from qlinkgen.plan.ends import ByLength, ByMark
 from qlinkgen.plan.parts import (
+    AddressPart,
     BlocksPart,
     CellPart,
     CheckPart,
@@ -131,7 +132,7 @@ def _beginning(found: Dissection, fault: Fault) -> Words:
         other = end.end_id if isinstance(end, MarkPart) else 0
         rule = f"no byte with 0x{fault.of.marker:02X} set and {fault.of.id_name} other than {other}"
         return f"header missing: {rule}", "the capture began late, or the header was lost"
-    if isinstance(fault.of, IdPart):
+    if isinstance(fault.of, IdPart | AddressPart):
         known = " or ".join(each.hex(" ") for each in fault.of.starts)
         return (
             f"{fault.of.name} missing: it is {known}",

@@ -102,7 +102,7 @@ class PartBits:
     shift: int
     bits: int
     at: int = 0
-    #: Legal values of a constant, the first of which is sent; the ids that a kind of frame begins with.
+    #: Legal values of a constant, the first of which is sent; ids or addresses that frames begin with.
     constants: tuple[int, ...] = ()
     #: The value for each direction.
     directions: Mapping[str, int] = field(default_factory=dict)
@@ -330,14 +330,14 @@ class DelimitedFrame:
 
     @property
     def leading(self) -> PartBits | None:
-        """The message id if a frame begins with all of it, else None."""
+        """The message id or the address if a frame begins with all of it, else None."""
         first = self.parts[0]
-        whole = first.role == "message" and first.bits == self.id_bits
+        whole = first.role == "address" or (first.role == "message" and first.bits == self.id_bits)
         return first.bits[0] if whole else None
 
     @property
     def starts(self) -> tuple[bytes, ...]:
-        """The bytes that frames begin with: a constant, or each id; () if any may."""
+        """The bytes that frames begin with: a constant, or each id or address; () if any may."""
         first = self.parts[0]
         if self.leading is None or first.scalar is None:
             return (first.constant,) if first.constant else ()

@@ -643,7 +643,9 @@ def _after_text(way: FrameStuffing) -> str:
 
 def _start_text(kind: FramePlan) -> str:
     """What frames of a kind begin with, "" if any bytes."""
-    ids = "the message ids" if kind.envelope.starts else ""
+    first = kind.envelope.parts[0]
+    ids = "an address" if isinstance(first, AddressPart) else "the message ids"
+    ids = ids if kind.envelope.starts else ""
     return kind.envelope.preamble.hex(" ").upper() or ids
 
 

@@ -125,9 +125,9 @@ class Envelope:
 
     @cached_property
     def starts(self) -> tuple[bytes, ...]:
-        """The bytes that a frame may begin with: a constant, or each message id; () if any."""
+        """The bytes that a frame may begin with: a constant, or each message id or address; () if any."""
         first = self.parts[0] if self.parts else None
-        return first.starts if isinstance(first, ConstantPart | IdPart) else ()
+        return first.starts if isinstance(first, ConstantPart | IdPart | AddressPart) else ()
 
     @property
     def length(self) -> LengthPart | None:

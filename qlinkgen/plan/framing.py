@@ -422,7 +422,7 @@ def _integer_part(frame: DelimitedFrame, part: StatedPart, transparency: Transpa
     if part.role == "message" and part.bits == frame.id_bits:
         return IdPart(part.name, integer, part.bits[0].constants)
     if part.role == "address":
-        return AddressPart(part.name, integer)
+        return AddressPart(part.name, integer, part.bits[0].constants)
     if part.bits:
         return CellPart(part.name, integer, tuple(map(_slot, part.bits)))
     bias, payload = frame.length_bias, frame.payload

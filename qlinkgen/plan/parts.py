@@ -70,10 +70,10 @@ class LengthPart(_IntegerPart):
 
 
 @dataclass(frozen=True, slots=True)
-class IdPart(_IntegerPart):
-    """The number of the message.
+class _LeadingPart(_IntegerPart):
+    """An integer that may be the first part: ``numbers`` are those that a kind of frame begins with.
 
-    ``numbers`` are those that a kind of frame begins with, () if other parts tell a frame.
+    They are () if other parts tell a frame.
     """
 
     numbers: tuple[int, ...] = ()
@@ -85,7 +85,12 @@ class IdPart(_IntegerPart):
 
 
 @dataclass(frozen=True, slots=True)
-class AddressPart(_IntegerPart):
+class IdPart(_LeadingPart):
+    """The number of the message."""
+
+
+@dataclass(frozen=True, slots=True)
+class AddressPart(_LeadingPart):
     """The address of the node: the recipient of a request, the sender of a response."""
 
 

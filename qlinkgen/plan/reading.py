@@ -280,6 +280,9 @@ class FrameReader:
                 self._begin(cursor, part, part.starts, taken)
                 self._identify(taken)
                 return 0
+            case AddressPart() if part.numbers:
+                self._begin(cursor, part, part.starts, taken)
+                return self._numeric(cursor, part, taken)
             case LengthPart() | IdPart() | AddressPart() | CellPart() | EqualPart():
                 taken.cells[part.name] = self._take(cursor, part, part.size)
                 return self._numeric(cursor, part, taken)

@@ -18,6 +18,8 @@ from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
 _RULE = "bad-kinds"
+#: Bits of an address that frames may begin with: receivers know each of its numbers.
+_BYTE = 8
 #: Size up to which only answers may have a frame without a check value.
 _SHORT = 2
 
@@ -100,8 +102,7 @@ def begun(kinds: FrameKinds, messages: list[Message], report: Reporter) -> Frame
         if kind.own and not any(kind in kinds.carrying(each.id) for each in messages):
             continue
         if kind.frame.leading is not None:
-            carried = (each.id for each in messages if kind in kinds.carrying(each.id))
-            numbers = tuple(sorted({number - kinds.base(kind.family) for number in carried}))
+            numbers = _leading(kinds, kind, messages)
             first = kind.frame.parts[0]
             first = replace(first, bits=(replace(first.bits[0], constants=numbers),))
             kind = replace(kind, frame=replace(kind.frame, parts=(first, *kind.frame.parts[1:])))  # noqa: PLW2901
@@ -110,6 +111,15 @@ def begun(kinds: FrameKinds, messages: list[Message], report: Reporter) -> Frame
     checker.starts(found)
     checker.inserted(found)
     return replace(kinds, kinds=tuple(found))
+
+
+def _leading(kinds: FrameKinds, kind: FrameKind, messages: list[Message]) -> tuple[int, ...]:
+    """The message ids, or the addresses, that the frames of a kind begin with."""
+    carried = [each for each in messages if kind in kinds.carrying(each.id)]
+    if kind.frame.parts[0].role == "message":
+        return tuple(sorted({each.id - kinds.base(kind.family) for each in carried}))
+    ranges = {each for message in carried for each in message.addresses}
+    return tuple(sorted({number for first, last in ranges for number in range(first, last + 1)}))
 
 
 def _built(
@@ -207,12 +217,16 @@ class _Checker:
         path: Path = ("frames", name, "parts")
         first = frame.parts[0].name
         if frame.leading is not None:
+            if frame.parts[0].role == "address" and frame.leading.bits > _BYTE:
+                what = f"{name} begins with {first} of {frame.leading.bits} bits, one of too many numbers"
+                self._error((*path, first), what, "begin it with a constant, or an address of one byte")
             if frame.part("terminator"):
-                what = f"{name} begins with its message id and ends with a terminator"
+                what = f"{name} begins with its {frame.parts[0].role.replace('message', 'message id')}"
+                what += " and ends with a terminator"
                 self._error((*path, first), what, "begin it with a constant, or give it a length")
         elif not frame.preamble and not frame.is_payload:
             what = f"{name} begins with {first}, not with constant bytes"
-            hint = "begin each kind with a constant that tells it from the others, or with the message id"
+            hint = "begin it with a constant that tells it from other kinds, its message id or its address"
             self._error((*path, first), what, hint)
         if frame.idle:
             what = (
@@ -246,8 +260,9 @@ class _Checker:
                 if (same := next(alike, None)) is not None:
                     first, second = (each.hex(" ").upper() for each in same)
                     what = f"{kind.name} begins with {first}, {other.name} with {second}"
-                    ids = kind.frame.leading or other.frame.leading
-                    hint = f"a receiver cannot tell them apart; use other constants{' or ids' if ids else ''}"
+                    led = {each.role for each in (kind.frame.leading, other.frame.leading) if each}
+                    others = ["constants", *sorted({"message": "ids"}.get(each, "addresses") for each in led)]
+                    hint = f"a receiver cannot tell them apart; use other {' or '.join(others)}"
                     self._error(("frames", kind.name), what, hint)
 
     def inserted(self, kinds: Sequence[FrameKind]) -> None:

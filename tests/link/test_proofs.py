@@ -31,7 +31,6 @@ byteorder: big
 frames:
   command:
     parts:
-      start: 7E
       node: {role: address, type: u8}
       code: {role: message, type: u8}
       data: {role: payload, size: 0..16}

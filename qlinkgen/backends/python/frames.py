@@ -486,7 +486,7 @@ def _head_checks(frame: FramePlan, envelope: Envelope, *, bare: bool) -> Iterato
 
 def _number_checks(envelope: Envelope, part: Numeric, *, bare: bool) -> Iterator[HeadCheck]:
     no_frame, end = '"no_frame", start, b""', envelope.offset(part) + part.size
-    if isinstance(part, IdPart) and part.numbers:
+    if isinstance(part, IdPart | AddressPart) and part.numbers:
         yield HeadCheck(f"head[:{end}] not in _BEGUN", no_frame, "constant")
     tests = (pieces.wrong(envelope, part, *source) for source in (("head",), pieces.BUFFER))
     for test, whole in zip(*tests, strict=True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import random
+import re
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -109,6 +110,47 @@ def prove(rng: random.Random, frame: Doc, fields: Doc) -> None:
     name = next(each for each in ("proof", "proof_2", "proof_3") if each not in fields)
     order = rng.choice(("big", "little"))
     fields[name] = {"type": kind, "algorithm": algorithm, "over": [*over, *fields], "byteorder": order}
+
+
+def lead_with_addresses(rng: random.Random, several: Kinds, bus: Doc) -> None:
+    """Let one kind begin with its address, if no other kind then begins like it."""
+    numbers = {int(each) for each in re.split(r"\.\.", bus.get("nodes", "0..65535"))}
+    starts = {*range(min(numbers), max(numbers) + 1), bus.get("broadcast", min(numbers))}
+    for family in rng.sample(several.families, len(several.families)):
+        frame = several.frames.get(family.name, {})
+        parts = frame.get("parts", {})
+        known = parts.get("node", {}) == {"role": "address", "type": "u8"} and "start" in parts
+        if not known or family.ended or "coding" in frame or max(starts) > 0xFF or rng.random() < 0.3:
+            continue
+        begun = {first for name in several.frames if name != family.name for first in _begun(several, name)}
+        if not starts.isdisjoint(begun):
+            continue
+        rest = {name: spec for name, spec in parts.items() if name not in ("start", "node")}
+        for spec in (each for each in rest.values() if isinstance(each, dict)):
+            for key in ("over", "counts"):
+                if isinstance(spec.get(key), list):
+                    seeds = [name for name in spec[key] if name.startswith("attribute.")]
+                    kept = [name for name in ("node", *rest) if name in spec[key]]
+                    spec[key] = kept + seeds or ["node"]
+        node = parts["node"]
+        parts.clear()
+        parts |= {"node": node, **rest}
+        return
+
+
+def _begun(several: Kinds, name: str) -> set[int]:
+    """What the frames of a kind may begin with."""
+    frame = several.frames[name]
+    first = next(iter(frame["parts"].values()))
+    found = {bytes.fromhex(frame["coding"]["insert"])[0]} if "insert" in frame.get("coding", {}) else set()
+    if isinstance(first, str):
+        return found | {bytes.fromhex(first)[0]}
+    if first["role"] == "payload":
+        return found
+    ids = {number for family in several.families if family.name == name for number in family.ids}
+    size = int(first["type"][1:]) // 8
+    both = {each for number in ids for each in (number >> 8 * (size - 1), number & 0xFF)}
+    return found | both
 
 
 def lead_with_ids(rng: random.Random, several: Kinds) -> None:

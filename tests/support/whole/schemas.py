@@ -104,6 +104,7 @@ class _Maker:
         if several:
             document |= self._kinds(several, maker, document["bus"])
             kinds.lead_with_ids(random.Random(f"ids {self.seed}"), several)
+            kinds.lead_with_addresses(random.Random(f"addresses {self.seed}"), several, document["bus"])
             self._dialogue_by_turn(several, maker, document["commands"])
         else:
             document |= self._traffic(shape, maker, document["bus"])

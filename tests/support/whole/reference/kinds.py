@@ -51,7 +51,11 @@ class Kinds:
                     ways = (
                         (way,) if frame.one_way or "if" in data["frames"][name] else (*self.ways, "message")
                     )
-                    numbers = {each.number for each in sent if each.direction in ways and name in each.frames}
+                    those = [each for each in sent if each.direction in ways and name in each.frames]
+                    numbers = {each.number for each in those}
+                    if frame.parts[0].spec.get("role") == "address":
+                        spans = {span for each in those for span in each.addresses}
+                        numbers = {number for first, last in spans for number in range(first, last + 1)}
                     frame.starts = tuple(put(frame.parts[0].pieces, number) for number in numbers)
                     frame.bare = False
 
