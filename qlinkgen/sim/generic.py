@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import inspect
 import itertools
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
 
 from qlinkgen.link.asked import answer_to
 from qlinkgen.link.codec import Codec, Command, Echoes, Framed, Many, Message, is_message
@@ -18,28 +16,8 @@ from qlinkgen.plan.codec import Codec as Interpreter
 from qlinkgen.plan.content import with_decided
 from qlinkgen.sim.memory import Memory
 from qlinkgen.sim.refusals import Refusals
+from qlinkgen.sim.smallest import items_of, required_values
 from qlinkgen.sim.values import Values
-
-#: Name of a rule class of a generated module to its smallest legal value.
-_SMALLEST: Mapping[str, Callable[[Any], object]] = {  # Any: a rule of the module's own, of the class named
-    "IntRule": lambda rule: rule.ranges[0][0],
-    "MaskRule": lambda rule: 0,  # noqa: ARG005
-    "ArrayRule": lambda rule: [rule.item.ranges[0][0]] * rule.fewest,
-    "BytesRule": lambda rule: bytes(rule.fewest),
-    "TextRule": lambda rule: " " * rule.fewest,
-    "ScaledRule": lambda rule: min(rule.scale.value(rule.scale.low), rule.scale.value(rule.scale.high)),
-    "FloatRule": lambda rule: rule.bounds[0] if rule.bounds else 0.0,
-    "PaddedRule": lambda rule: _smallest(rule.rule),
-    "ListRule": lambda rule: [_smallest(rule.item)] * rule.fewest,
-    "RecordRule": lambda rule: _record(rule.kind),
-    "RecordsRule": lambda rule: [_record(rule.kind) for _ in range(rule.fewest)],
-}
-#: Name of a rule class to as many smallest items as asked for.
-_REPEATED: Mapping[str, Callable[[Any, int], object]] = {  # Any: as above
-    "ArrayRule": lambda rule, count: [rule.item.ranges[0][0]] * count,
-    "BytesRule": lambda _, count: bytes(count),
-    "TextRule": lambda _, count: " " * count,
-}
 
 
 class GenericNode:
@@ -214,7 +192,7 @@ def _sizes(command: Command, asked: Framed) -> dict[str, object]:
     found: dict[str, object] = {}
     if command.response is not None and type(asked) is command.sized_by:
         for name, number, _ in command.sizes:
-            found |= _items(command.response, name, getattr(asked, number))
+            found |= items_of(command.response, name, getattr(asked, number))
     return found
 
 
@@ -223,34 +201,3 @@ def _repeated(own: object, asked: object) -> object:
     if not isinstance(own, list | bytes | str) or not isinstance(asked, type(own)) or not own:
         return asked
     return (own * (len(asked) // len(own) + 1))[: len(asked)]
-
-
-def _items(message: type[Message], name: str, count: int) -> dict[str, object]:
-    """Return as many items of a field as asked for; nothing for records, which have no smallest value."""
-    rule = next((rule for rule in getattr(message, "RULES", ()) if rule.name == name), None)
-    make = _REPEATED.get(type(rule).__name__)
-    return {name: make(rule, count)} if make else {}
-
-
-def required_values(message: Callable[..., object]) -> dict[str, object]:
-    """Return a legal value for each field of a class of messages or records that has no default.
-
-    An address is none of them.
-    """
-    rules = {rule.name: rule for rule in getattr(message, "RULES", ())}
-    parameters = inspect.signature(message).parameters.values()
-    return {
-        each.name: _smallest(rules[each.name])
-        for each in parameters
-        if each.kind is each.KEYWORD_ONLY
-        and each.default is each.empty
-        and each.name != getattr(message, "ADDRESS", "")  # which records do not have
-    }
-
-
-def _smallest(rule: Any) -> object:
-    return _SMALLEST[type(rule).__name__](rule)
-
-
-def _record(kind: Callable[..., object]) -> object:
-    return kind(**required_values(kind))

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from qlinkgen.model.naming import method
-from qlinkgen.sim.generic import required_values
 from qlinkgen.sim.joining import join
+from qlinkgen.sim.smallest import required_values
 from tests.bus.wires import bus_of, codec_of
 
 #: Several answers of each kind, dialogues, other replies, silences, a link, frames with and without nodes.

@@ -15,7 +15,8 @@ from qlinkgen.plan import plan_of
 from qlinkgen.schema import load as load_schema
 from qlinkgen.schema import loads
 from qlinkgen.sim import VirtualPort, Wire
-from qlinkgen.sim.generic import GenericNode, required_values
+from qlinkgen.sim.generic import GenericNode
+from qlinkgen.sim.smallest import required_values
 from qlinkgen.transport.blocking import BlockingMaster
 from tests.cli.wire import REPOSITORY
 
