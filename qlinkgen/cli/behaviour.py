@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
@@ -18,13 +18,14 @@ from qlinkgen.sim import SimulationError
 from qlinkgen.sim.generic import GenericNode
 from qlinkgen.sim.memory import Memory
 from qlinkgen.sim.refusals import Refusals, command_named
+from qlinkgen.sim.tables import Access, Table
 from qlinkgen.sim.values import Values
 
 if TYPE_CHECKING:
     from qlinkgen.plan import Plan
 
 #: Keys of the file, as the options are called.
-_KEYS = ("values", "delay", "refuse", "memory")
+_KEYS = ("values", "delay", "refuse", "memory", "tables")
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +74,8 @@ class Nodes:
         try:
             self._values = Values(protocol, getattr(codec, "RECORDS", {}), values, seed=seed)
             self._refusals = Refusals(codec, refused, seed=seed)
+            self._tables = list(_tables(file, given.file))
+            self._own_tables()  # refuses what is wrong
             self.delays: Mapping[type[Framed], float] = {
                 command_named(codec, name).request: delay for name, delay in delays.items()
             }
@@ -88,8 +91,12 @@ class Nodes:
             self._plan,
             values=self._values,
             memory=Memory(self._protocol) if self._memory else None,
+            tables=self._own_tables(),
             refusals=self._refusals,
         )
+
+    def _own_tables(self) -> list[Table]:
+        return [Table(self._protocol, uses) for uses in self._tables]
 
     def _check(self, given_to: Collection[str]) -> None:
         """Refuse values that are only wrong together, by an answer to each command that has some."""
@@ -103,6 +110,20 @@ class Nodes:
                 self._codec.encode(node.example(command))
             except self._codec.EncodeError as error:
                 raise Failure(str(error)) from None
+
+
+def _tables(file: Mapping[str, Json], path: str | None) -> Iterator[Mapping[str, Access]]:
+    for table, uses in _mapping(file.get("tables"), path, "tables").items():
+        found = {}
+        for name, access in _mapping(uses, path, f"tables: {table}").items():
+            match access:
+                case {"at": str(at), "value": str(value), **others} if not others:
+                    found[name] = Access((at,), value)
+                case {"at": [*at], "value": str(value), **others} if at and not others:
+                    found[name] = Access([str(field) for field in at], value)
+                case _:
+                    raise Failure(f"{path}: tables: {table}: {name}: write {{at: FIELD, value: FIELD}}")
+        yield found
 
 
 def _numbers(

@@ -32,7 +32,7 @@ BELONGS: Belongs = {
     "file",
     type=click.Path(),
     metavar="FILE",
-    help="A YAML file with values, delay, refuse and memory.",
+    help="A YAML file with values, delay, refuse, memory and tables.",
 )
 @click.option("--memory", is_flag=True, help="Answer with what requests have set, by the names of fields.")
 @click.option(

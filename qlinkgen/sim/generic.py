@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from qlinkgen.link.asked import answer_to
 from qlinkgen.link.codec import Codec, Command, Echoes, Framed, Many, Message, is_message
@@ -17,6 +17,7 @@ from qlinkgen.plan.content import with_decided
 from qlinkgen.sim.memory import Memory
 from qlinkgen.sim.refusals import Refusals
 from qlinkgen.sim.smallest import items_of, required_values
+from qlinkgen.sim.tables import Table
 from qlinkgen.sim.values import Values
 
 
@@ -39,6 +40,7 @@ class GenericNode:
         *,
         values: Values | None = None,
         memory: Memory | None = None,
+        tables: Sequence[Table] = (),
         refusals: Refusals | None = None,
     ) -> None:
         """Make a node of a generated module.
@@ -49,11 +51,13 @@ class GenericNode:
             plan: the plan of the same protocol gives the defaults of fields that echoed ones decide.
             values: values of its answers.
             memory: keeps what requests set, in place of these values.
+            tables: keep what requests set under a number.
             refusals: the requests that it refuses.
         """
         self.number = number
         self._values = values
         self._memory = memory
+        self._tables = tables
         self._refusals = refusals
         self._now = 0.0
         self.requests = 0
@@ -82,6 +86,8 @@ class GenericNode:
             raise Refusal(self._answer(reply.message, request, reply.echoes, given))
         if self._memory:
             self._memory.keep(request)
+        for table in self._tables:
+            table.keep(request)
         if command is None or command.response is None:
             return None
         if command.steps:
@@ -145,15 +151,18 @@ class GenericNode:
         values |= own
         values |= {name: getattr(request, of) if isinstance(of, str) else of for name, of in echoes.items()}
         values |= {name: _repeated(own.get(name), each) for name, each in given.items()}
+        for table in self._tables:
+            kept = table.of(kind.NAME, request, values)
+            own, values = {**own, **kept}, {**values, **kept}
         if address := kind.ADDRESS:
             values[address] = self.number
         make: Callable[..., Message] = kind
         message = make(**values)
         settled = self._settled(self._interpreter, message, request) if self._interpreter else message
         if settled is not message:
-            for name in own.keys() - echoes.keys() - given.keys():
+            for name in own.keys() - echoes.keys():
                 if getattr(settled, name) is not None:
-                    setattr(settled, name, own[name])
+                    setattr(settled, name, values[name])
         return settled
 
     def _own(self, name: str) -> dict[str, object]:

@@ -29,7 +29,7 @@ class Memory:
                     request.name
                     for request in requests
                     for each in request.values
-                    if each.name == value.name and _fits(each.type, value.type)
+                    if each.name == value.name and fits(each.type, value.type)
                 )
                 if setting:
                     fields[attribute(value.name)] = setting
@@ -56,14 +56,14 @@ class Memory:
 _Kind = Scalar | Blob | Array | Record | Records
 
 
-def _fits(given: _Kind, wanted: _Kind) -> bool:
+def fits(given: _Kind, wanted: _Kind) -> bool:
     """Whether a type can hold every value of another one."""
     match given, wanted:
         case Scalar(), Scalar():
             same = (given.scaling, given.meaning) == (wanted.scaling, wanted.meaning)
             return same and wanted.minimum <= given.minimum and given.maximum <= wanted.maximum
         case Array(), Array():
-            return _fits(given.item, wanted.item) and _within(given.length, wanted.length)
+            return fits(given.item, wanted.item) and _within(given.length, wanted.length)
         case Blob(), Blob():
             alike = given.text == wanted.text and given.excluded == wanted.excluded
             return alike and _within(given.length, wanted.length)

