@@ -193,7 +193,11 @@ class PartSpec(Fact):
         default=None,
         description="Value of a checksum over nothing, or of a length where a longer one follows",
     )
-    over: list[str] | None = Field(default=None, description="Parts that the checksum covers")
+    over: list[str] | None = Field(
+        default=None,
+        description="Parts that the checksum covers; beside a payload alone, request.PART before it: parts "
+        "of the frame of the request",
+    )
     sent: list[WholeRange] | None = Field(
         default=None, description="Bit ranges of the checksum that are sent, one per byte"
     )

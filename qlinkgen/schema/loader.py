@@ -29,6 +29,7 @@ from qlinkgen.schema.reading import read_regular, reason_of
 from qlinkgen.schema.report import Reporter, did_you_mean
 from qlinkgen.schema.response_forms import with_forms
 from qlinkgen.schema.seeds import check_references, check_types
+from qlinkgen.schema.shared_proofs import with_shared_proofs
 from qlinkgen.schema.source import Data, parse
 from qlinkgen.schema.structure import check_structure
 from qlinkgen.schema.switches import without_choices
@@ -152,7 +153,7 @@ def _build(
         return None
     whole = without_choices(whole, report)
     check_lifetimes(whole, report)
-    file = with_forms(in_version(whole, version), report)
+    file = with_shared_proofs(with_forms(in_version(whole, version), report))
     text += f"\nversion {version}" if version else ""
     payload_max = payload_bounds(file)[1]
     types = TypeBuilder(file, report, payload_max)

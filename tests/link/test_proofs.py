@@ -145,3 +145,39 @@ def test_explain_compares_it_where_the_request_is_known(codec: ModuleType) -> No
     assert [(each.kind, each.rule, each.at, each.right) for each in found.faults] == [
         ("crc", Rule.PROOF, 5, int.from_bytes(right[-2:], "big"))
     ]
+
+
+def test_a_kind_may_state_it_for_all_its_responses() -> None:
+    check = "crc: {type: u16, algorithm: crc-16/xmodem, over: [request.node, request.code, %s]}"
+    text = """\
+qlinkgen: 1
+protocol: {name: claw, revision: "1", source: Manual}
+frames:
+  command:
+    parts:
+      node: {role: address, type: u8}
+      code: {role: message, type: u8}
+      sum: {type: u8, algorithm: sum8, over: [node, code]}
+  plain: {parts: {data: {role: payload, size: 0..6}, %s}}
+  short: {parts: {data: {role: payload, size: 1..8}}}
+bus: {kind: master_slave, nodes: 0x80..0x87, response_within: 10 ms}
+defaults: {frame: command, addressing: node, repeat: safe, response: {id: none, frame: plain}}
+commands:
+  speed: {id: 30, request: {}, response: {speed: u32, mode: {switch: speed, cases: {0: u8}, default: u16}%s}}
+  none: {id: 31, request: {}, response: {frame: plain, fields: {%s}}}
+  steps: {id: 32, request: {}, steps: [{receive: {frame: plain, fields: {state: u8%s}}}]}
+  go: {id: 33, request: {}, response: {frame: short, fields: {done: u8}}}
+"""
+    one = loads(text % (check % "data", "", "", ""), "claw.yaml")
+    # Written out.
+    plain = text.replace("0..6}, %s}", "2..8}}")
+    each = (", " + check % "speed, mode", check.replace(", %s", ""), ", " + check % "state")
+    other = loads(plain % each, "claw.yaml")
+    for protocol, faults in (one, other):
+        assert protocol is not None, faults
+    assert one[0] is not None
+    assert other[0] is not None
+    assert one[0].frame == other[0].frame
+    assert one[0].commands == other[0].commands
+    assert one[0].messages == other[0].messages
+    assert one[0].by_name["none.response"].values[-1].field.proves == ("node", "code")
