@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import re
+import select
 import signal
 import subprocess
-import time
+import termios
 from pathlib import Path
 
 import pytest
@@ -153,28 +153,34 @@ def test_with_a_port_for_a_time(tmp_path: Path) -> None:
     assert f"address 1: {program}:1:1: RETURN without GOSUB" in err.decode()
 
 
+def read_terminal(descriptor: int, wanted: str) -> bytes:
+    data = b""
+    while wanted not in data.decode():
+        assert select.select([descriptor], [], [], PATIENCE)[0], data
+        data += os.read(descriptor, 4096)
+    return data
+
+
 def test_keys_typed_on_a_terminal() -> None:
     own, theirs = os.openpty()
+    before = termios.tcgetattr(own)
     environment = {**ENVIRONMENT, "TERM": "xterm"}
     command = [*COMMAND, "simulate", "trio", *COUNTER, "--closed"]
     with subprocess.Popen(command, env=environment, stdin=theirs, stdout=theirs, stderr=theirs) as process:
-        os.close(theirs)
         try:
             shown = b""
             for typed, wanted in ((b"", "WANTED:    0"), (b"1", "WANTED:    1"), (b"x+", "WANTED:    2"),
                                   (b"\t", "> address 3"), (b"-\r", "MADE:      1")):  # fmt: skip
                 os.write(own, typed)
-                limit = time.monotonic() + PATIENCE
-                while wanted not in shown.decode():
-                    assert time.monotonic() < limit
-                    shown += os.read(own, 4096)
+                shown += read_terminal(own, wanted)
+            assert termios.tcgetattr(own) != before, "it does not wait for lines"
             process.send_signal(signal.SIGINT)
-            with contextlib.suppress(OSError):  # EIO: the program has closed its end
-                while data := os.read(own, 4096):
-                    shown += data
+            shown += read_terminal(own, "damaged")
             assert process.wait(PATIENCE) == 0
+            assert termios.tcgetattr(own) == before
         finally:
             process.kill()
+            os.close(theirs)
             os.close(own)
     assert "\x1b[15A" in shown.decode(), "drawn over the last state"
     assert "program ended; VR(1) = 1" in shown.decode()
