@@ -74,8 +74,8 @@ class SlaveOptions(TypedDict, total=False):
 
     turnaround: seconds from a request to its answer, so that the master can release the line.
     echo: whether the adapter echoes sent bytes.
-    slack: largest delay in seconds with which bytes of one frame arrive; where only a silence ends a frame,
-        slaves wait for it that much longer. By default derived from the port.
+    slack: largest delay in seconds with which bytes of one frame arrive; where a silence ends a frame, slaves
+        wait for it that much longer. By default derived from the port.
     on_frame: called with each frame, sent or received, and with bytes that are none.
     """
 

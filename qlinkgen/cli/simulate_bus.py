@@ -15,6 +15,7 @@ from qlinkgen.link.slave import Node, SlaveEngine
 from qlinkgen.plan import plan_of
 from qlinkgen.protocols.qlink.facts import NODES
 from qlinkgen.sim import FaultPlan, Wire
+from qlinkgen.transport.conversation import OTHER_PROGRAM
 
 #: Byte times from a request to its response on a paced line, so that the master can release the line.
 TURNAROUND = 1
@@ -41,7 +42,7 @@ def simulate_bus(
         baud=baud, bits_per_byte=bits, faults=plan, echo=echo, chunks="byte" if baud is not None else "frame"
     )
     turnaround = TURNAROUND * bits / baud if baud else 0.0
-    engines = [SlaveEngine(codec, node, turnaround=turnaround) for node in numbered]
+    engines = [SlaveEngine(codec, node, turnaround=turnaround, host_slack=OTHER_PROGRAM) for node in numbered]
     for engine in engines:
         engine.delays = delays
         wire.attach(engine, f"node {engine.node.number}")

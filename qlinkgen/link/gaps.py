@@ -5,12 +5,15 @@ from __future__ import annotations
 from qlinkgen.link.codec import Module
 
 
+def idle_of(codec: Module, byte_time: float) -> float:
+    """Seconds of the idle line between two frames of a protocol, 0 if they may follow each other."""
+    idle: tuple[float, float] | None = getattr(codec, "IDLE", None)
+    return 0.0 if idle is None else max(idle[0] * byte_time, idle[1])
+
+
 def silence_of(codec: Module, byte_time: float) -> float:
     """Seconds of the idle line that alone ends a frame of a protocol, 0 if something else does."""
-    silence: tuple[float, float] | None = getattr(codec, "IDLE", None)
-    if silence is None or not getattr(codec, "IDLE_ALONE", False):
-        return 0.0
-    return max(silence[0] * byte_time, silence[1])
+    return idle_of(codec, byte_time) if getattr(codec, "IDLE_ALONE", False) else 0.0
 
 
 def break_of(codec: Module, byte_time: float) -> float:

@@ -23,7 +23,7 @@ from qlinkgen.link.codec import (
 )
 from qlinkgen.link.echo import EchoCanceller
 from qlinkgen.link.events import Frame, heard
-from qlinkgen.link.gaps import Gap, break_of, silence_of
+from qlinkgen.link.gaps import Gap, break_of, idle_of
 from qlinkgen.link.kept import kept_of
 from qlinkgen.link.many import nodes_asked
 from qlinkgen.link.numbering import numbering_of, repeat, repeated_of
@@ -136,8 +136,8 @@ class SlaveEngine:
             baud: speed of the line, by default that of the schema.
             echo: whether the adapter echoes sent bytes. An answer can be the same bytes as its request, so
                 with an unexpected echo the node would answer itself endlessly.
-            host_slack: largest delay with which bytes of one frame arrive; where only a silence ends a
-                frame, the node waits for it that much longer.
+            host_slack: largest delay with which bytes of one frame arrive; where a silence ends a frame, the
+                node waits for it that much longer.
             decoder: that of a `PeerEngine`; by default its own.
         """
         if echo not in ("expect", "none"):
@@ -184,7 +184,7 @@ class SlaveEngine:
         self._byte_time = codec.BUS.bits_per_byte / speed if speed else 0.0
         self._unknown = unknown_requests(codec, self._byte_time)
         self.break_time = break_of(codec, self._byte_time)
-        idle = silence_of(codec, self._byte_time)
+        idle = idle_of(codec, self._byte_time)
         self._gap = Gap(idle + host_slack if idle else 0.0)
         self._echo = EchoCanceller(echo)
         self._last = self._answer = b""

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from qlinkgen.errors import NoReply, PortLost, Refused
-from qlinkgen.link import Refusal
+from qlinkgen.link import Refusal, SlaveEngine
 from qlinkgen.link.events import Frame, Sent
 from qlinkgen.link.poll import Key, Poller
 from qlinkgen.protocols.mc1231a import Host
@@ -70,6 +70,16 @@ def test_values_go_both_ways_and_refusals_have_their_reply(bus_pair: BusPairs) -
     with pytest.raises(Refused, match="illegal_function"):
         first.read_coils(start=0, quantity=1)
     assert pair.others[0].counters.answers == 4  # type: ignore[union-attr]  # a slave
+
+
+def test_the_answer_of_another_node_does_not_deafen_a_slave() -> None:
+    """Read as a request, its third byte from the end says that 62 bytes follow: the silence tells better."""
+    slave = SlaveEngine(codec, Registers(), host_slack=0.001)
+    answer = codec.WriteMultipleCoilsResponse(node=1, start=36632, quantity=0x11D).to_frame()
+    request = codec.ReadHoldingRegistersRequest(node=NODE, start=4, quantity=1).to_frame()
+    for slave_time, heard in ((0.0, answer), (0.05, request)):
+        slave.receive(heard, slave_time)
+    assert slave.bytes_to_send(0.1) == codec.ReadHoldingRegistersResponse(node=NODE, registers=[4]).to_frame()
 
 
 def test_faults_are_repeated_and_a_silent_node_goes_offline(bus_pair: BusPairs) -> None:

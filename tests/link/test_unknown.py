@@ -97,5 +97,5 @@ def test_a_known_request_is_not_refused() -> None:
     codec: Any = made("", SILENCE, "request.id + 0x80")
     slave = SlaveEngine(codec, Silent())
     slave.receive(codec.ReadRequest(node=3, number=1).to_frame(), 1.0)
-    assert slave.next_timer() is None
     assert slave.bytes_to_send(2.0) == b""
+    assert slave.next_timer() is None
