@@ -72,14 +72,15 @@ class LinkOptions(PeerOptions, Observers, total=False):
 class SlaveOptions(TypedDict, total=False):
     """Options of slaves.
 
-    turnaround: seconds from a request to its answer, so that the master can release the line.
+    turnaround: seconds from a request to its answer, so that the master can release the line; by default the
+        silence that the schema requires between two frames, on a port that sends at the baud rate.
     echo: whether the adapter echoes sent bytes.
     slack: largest delay in seconds with which bytes of one frame arrive; where a silence ends a frame, slaves
         wait for it that much longer. By default derived from the port.
     on_frame: called with each frame, sent or received, and with bytes that are none.
     """
 
-    turnaround: float
+    turnaround: float | None
     echo: Literal["expect", "none"]
     slack: float | None
     on_frame: Callable[[Frame], None] | None

@@ -14,10 +14,11 @@ from qlinkgen.bus.watching import tell_frames, trace
 from qlinkgen.errors import PortLost
 from qlinkgen.link.codec import Codec
 from qlinkgen.link.events import Frame
+from qlinkgen.link.gaps import idle_of
 from qlinkgen.link.slave import Node, SlaveEngine
 from qlinkgen.transport.conversation import host_slack
 from qlinkgen.transport.opening import closing_on_error
-from qlinkgen.transport.port import Port
+from qlinkgen.transport.port import Ability, Port
 from qlinkgen.transport.serving import serving
 
 
@@ -40,7 +41,7 @@ class Slave:
         self,
         port: Port,
         *handlers: Node,
-        turnaround: float = 0.0,
+        turnaround: float | None = None,
         echo: Literal["expect", "none"] = "none",
         slack: float | None = None,
         on_frame: Callable[[Frame], None] | None = None,
@@ -55,6 +56,9 @@ class Slave:
         self.port = port
         self.on_frame = on_frame
         late = host_slack(port) if slack is None else slack
+        if turnaround is None:
+            paced = port.capabilities.paced is Ability.YES
+            turnaround = idle_of(self.codec, self.codec.BUS.bits_per_byte / port.baud) if paced else 0.0
         self.engines = [
             SlaveEngine(self.codec, each, turnaround=turnaround, baud=port.baud, echo=echo, host_slack=late)
             for each in handlers

@@ -145,6 +145,8 @@ class MasterEngine:
         self.own = MasterNumber(codec, number)
         self._byte_time = timing.byte_time
         self._paced = timing.paced
+        #: Its next frame waits; a silence that alone ends frames is over when one is received.
+        self._keeps_idle = timing.paced and timing.idle > 0 and not timing.silence
         self._echo = EchoCanceller(echo)
         self._probe = EchoProbe()
         self._broken_echo = EchoBroken(0.0, None, b"", b"")
@@ -727,7 +729,9 @@ class MasterEngine:
             self._echo.forget()
         if self._attempts.number > 1:
             self._distrust(now)  # the answer to an earlier attempt may still arrive
-        if self._paced and self.codec.encode(answer)[-1:] != self._received[-1:]:
+        if self._keeps_idle:
+            self._line.free_at = max(self._line.free_at, now + self.timing.idle)
+        elif self._paced and self.codec.encode(answer)[-1:] != self._received[-1:]:
             self._line.free_at = (
                 now + self._byte_time
             )  # the byte inserted after the last byte of the checksum

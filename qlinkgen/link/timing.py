@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 from qlinkgen.link.codec import Command, Framed, Many, Module, OtherReply, StepSpan, meanings
 from qlinkgen.link.echo import PROBE
-from qlinkgen.link.gaps import break_of, silence_of
+from qlinkgen.link.gaps import break_of, idle_of, silence_of
 
 #: Byte times after which a line counts as quiet; also Q.link's response time.
 QUIET_BYTES = 3
@@ -38,6 +38,7 @@ class Timing:
         silence: wait for the idle line that ends a frame, delays of the host included; 0 if frames end
             otherwise.
         line_break: seconds of the break that begins each frame, 0 without one.
+        idle: silence that receivers need between two frames, whatever else ends one; 0 without one.
     """
 
     baud: int
@@ -49,6 +50,7 @@ class Timing:
     longest_allowance: float = 0.0
     silence: float = 0.0
     line_break: float = 0.0
+    idle: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
@@ -77,11 +79,11 @@ class Timing:
             raise ValueError("the schema has no commands, so it has no deadlines")
         longest = max(*map(_longest_request, commands), *map(_longest_answer, commands))
         plain = cls(speed, codec.BUS.bits_per_byte, host_slack, longest, paced, attempts)
-        idle = silence_of(codec, plain.byte_time)
-        silence = idle + host_slack if idle else 0.0
+        idle = idle_of(codec, plain.byte_time)
+        silence = idle + host_slack if silence_of(codec, plain.byte_time) else 0.0
         allowance = max(map(plain.allowance, commands))
         broken = break_of(codec, plain.byte_time)
-        return replace(plain, longest_allowance=allowance, silence=silence, line_break=broken)
+        return replace(plain, longest_allowance=allowance, silence=silence, line_break=broken, idle=idle)
 
     @property
     def byte_time(self) -> float:
@@ -156,7 +158,7 @@ class Timing:
 
     def gap(self, command: Command) -> float:
         """Return the pause for slaves after a request without a response."""
-        return max(self.allowance(command), self.silence)
+        return max(self.allowance(command), self.silence, self.idle)
 
     def attempts_of(self, command: Command, attempts: int | None = None) -> int:
         """Return the largest number of transmissions of a request: 1 if it is unsafe to repeat."""
@@ -174,9 +176,10 @@ class Timing:
         """
         given_up = self.on_wire(2 * self.longest_frame) + self.longest_allowance + self.host_slack
         search = self.quiet_limit + self.on_wire(len(PROBE)) + self.quiet
-        attempt = self.quiet_limit + self.deadline(command)
+        before = self.quiet_limit + self.idle
+        attempt = before + self.deadline(command)
         for step in command.steps:
-            attempt += self.step(step) + (self.quiet_limit if step[0] == "send" else 0.0)
+            attempt += self.step(step) + (before if step[0] == "send" else 0.0)
         many = command.many
         if many is not None:
             endless = many.until is not None or many.reply is not None

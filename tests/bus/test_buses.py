@@ -9,7 +9,8 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import closing
-from itertools import takewhile
+from dataclasses import replace
+from itertools import pairwise, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from qlinkgen.link.poll import Key, Poller
 from qlinkgen.protocols.mc1231a import Host
 from qlinkgen.pytest_plugin import BusPairs, bus_pair
 from qlinkgen.sim import FaultPlan
-from qlinkgen.transport import memory_pair, open_pty
+from qlinkgen.transport import Ability, memory_pair, open_pty
 from tests.bus.wires import PACKAGE, bus_of, codec_of, of_text, write
 from tests.library.protocols import described
 
@@ -80,6 +81,27 @@ def test_the_answer_of_another_node_does_not_deafen_a_slave() -> None:
     for slave_time, heard in ((0.0, answer), (0.05, request)):
         slave.receive(heard, slave_time)
     assert slave.bytes_to_send(0.1) == codec.ReadHoldingRegistersResponse(node=NODE, registers=[4]).to_frame()
+
+
+def test_frames_have_the_silence_between_them_that_the_schema_requires(bus_pair: BusPairs) -> None:
+    pair = bus_pair(modbus.Bus, Registers(), turnaround=0.01)
+    bus, byte_time = pair.master, pair.wire.byte_time
+    heard: list[tuple[float, float]] = []
+    pair.wire.taps.append(lambda at, _, data: heard.append((at - len(data) * byte_time, at)))
+    for start in (1, 2):
+        read(bus.node(NODE), start)
+    bus.write_single_register(0, number=1, value=1)
+    read(bus.node(NODE), 1)
+    silences = [begin - end for (_, end), (begin, _) in pairwise(heard)]
+    assert len(silences) == 6
+    assert min(silences) >= 3.5 * byte_time
+    # So has the answer of a slave on a paced port.
+    _, far = memory_pair()
+    far.capabilities = replace(far.capabilities, paced=Ability.YES)
+    (paced,) = modbus.Slave(far, Registers(), slack=0.0).engines
+    paced.receive(codec.ReadHoldingRegistersRequest(node=NODE, start=4, quantity=1).to_frame(), 1.0)
+    assert not paced.bytes_to_send(1.0 + 0.00174)
+    assert paced.bytes_to_send(1.0 + 0.00176)
 
 
 def test_faults_are_repeated_and_a_silent_node_goes_offline(bus_pair: BusPairs) -> None:
