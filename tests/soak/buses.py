@@ -1,0 +1,192 @@
+"""Random transactions of protocols of the library on a bad line: none gets the answer to another.
+
+`python -m tests.soak.buses [--transactions N] [--seed N]` runs N for each protocol, on a virtual clock.
+Answers are random numbers, drawn anew in each transaction.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import random
+import sys
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+from qlinkgen.errors import LinkError
+from qlinkgen.sim import FaultPlan
+from qlinkgen.sim.generic import GenericNode
+from qlinkgen.sim.joining import join
+from qlinkgen.sim.smallest import required_values
+from tests.bus.wires import bus_of, codec_of
+
+#: Protocols with check values of 16 bits.
+NAMES = ("modbus_rtu", "dynamixel_2", "vesc", "ubx", "dnp3")
+#: Seconds: delays of the host, and late answers: after their deadline, while the line has to be quiet.
+SLACK, LATE = 0.012, (0.016, 0.022)
+#: Chance of each kind of fault in a transmission: together they hit 5 % of them. Answers do not come twice:
+#: the second one cannot be told from the answer to the same request once more, if that is lost.
+SHARE = 0.05 / 6
+KINDS = ("drop", "truncate", "delay", "noise")
+#: Two flipped bits can leave the check value of UBX right.
+BITS = (1, 1)
+
+
+@dataclass
+class Outcome:
+    """What became of the transactions of one protocol."""
+
+    name: str
+    answered: int = 0
+    told: int = 0
+    failed: int = 0
+    wrong: list[str] = field(default_factory=list)
+    repeats: int = 0
+    timeouts: int = 0
+    faults: int = 0
+
+    def __str__(self) -> str:
+        """One line."""
+        return (
+            f"{self.name:12} {self.answered} answered, {self.told} without an answer, {self.failed} failed, "
+            f"{self.repeats} repeats, {self.timeouts} timeouts, {self.faults} faults, {len(self.wrong)} wrong"
+        )
+
+
+def vary(message: Any, rng: random.Random, kept: set[str]) -> bool:
+    """Give numbers and bytes of a message random values of the same size; return whether there are any."""
+    varied = False
+    for rule in message.RULES:
+        if rule.name in kept or getattr(message, rule.name, None) is None:
+            continue
+        value: Any = getattr(message, rule.name)
+        match type(rule).__name__:
+            case "IntRule":
+                value = rng.randint(*rng.choice(rule.ranges))
+            case "BytesRule":
+                value = rng.randbytes(len(value))
+            case "ArrayRule":
+                value = [rng.randint(*rule.item.ranges[0]) for _ in value]
+            case _:
+                continue
+        setattr(message, rule.name, value)
+        varied = True
+    return varied
+
+
+class Witness(GenericNode):
+    """A node that answers with random numbers, and keeps what it has answered in the present transaction."""
+
+    def __init__(self, codec: Any, number: int, rng: random.Random) -> None:
+        super().__init__(codec, number)
+        self.made: list[Any] = []
+        #: Classes of answers without anything to draw, which are always equal.
+        self.plain: set[type] = set()
+        self._rng = rng
+
+    def handle(self, request: Any, now: float) -> Any:
+        """Return the answer to a request, or several."""
+        found: Any = super().handle(request, now)
+        command = self._commands[type(request)]
+        for each in found if isinstance(found, list) else [found] if found is not None else []:
+            kept = {each.ADDRESS, *(name for _, name, _ in command.sizes)}
+            kept |= {reply.switch for reply in command.replies.values()}
+            if command.many is not None and command.many.until is not None:
+                kept.add(command.many.until[0])
+            if not vary(each, self._rng, kept):
+                self.plain.add(type(each))
+            self.made.append(each)
+        return found
+
+
+class Traffic:
+    """Random requests of a protocol, those of dialogues, records and endless answers excepted."""
+
+    def __init__(self, codec: Any, rng: random.Random, numbers: list[int]) -> None:
+        self._rng = rng
+        self._numbers = numbers
+        self._commands = [
+            each
+            for each in codec.COMMANDS.values()
+            if not each.steps and not hasattr(each.many, "stopped_by") and not hasattr(each.many, "each")
+        ]
+
+    def next(self) -> Any:
+        """A request that can be sent."""
+        command = self._rng.choice(self._commands)
+        kind = command.request
+        where = {}
+        if kind.ADDRESS and command.addressing != "broadcast":
+            where = {kind.ADDRESS: self._rng.choice(self._numbers)}
+        values = required_values(kind)
+        plain, varied = kind(**values, **where), kind(**values, **where)
+        vary(varied, self._rng, {kind.ADDRESS})
+        try:
+            varied.to_frame()
+        except ValueError:  # two of its values do not go together
+            return plain
+        return varied
+
+
+def run(name: str, transactions: int, seed: int, *, asynchronous: bool = False) -> Outcome:
+    """Perform transactions of a protocol with two nodes, and a third one that is missing."""
+    module, codec = bus_of(name), codec_of(name)
+    prefix = "Async" if asynchronous else ""
+    made = next(each for each in ("Bus", "Device", "Peer") if hasattr(module, each))
+    rates: dict[str, Any] = dict.fromkeys(KINDS, SHARE)
+    plan = FaultPlan(**rates, flip=(SHARE, *BITS), late=(SHARE, *LATE), seed=seed)
+    rng = random.Random(f"{name} {seed}")
+    first = codec.BUS.first_node
+    numbers = [0] if first is None else [first, first + 1]
+    nodes = [Witness(codec, number, rng) for number in numbers]
+    traffic = Traffic(codec, rng, [*numbers * 9, numbers[-1] + 1])
+    outcome = Outcome(name)
+    options: dict[str, Any] = {} if made == "Peer" else {"echo": "none", "health": None}
+    with (
+        asyncio.Runner() as runner,
+        join(getattr(module, prefix + made), *nodes, faults=plan, slack=SLACK, **options) as pair,
+    ):
+        for _ in range(transactions):
+            for node in nodes:
+                node.made.clear()
+            request = traffic.next()
+            try:
+                done: Any = pair.master.transact(request)
+                reply = runner.run(done) if asynchronous else done
+            except LinkError:
+                outcome.failed += 1
+                continue
+            answers = reply.response if isinstance(reply.response, list) else [reply.response]
+            if answers == [None]:
+                outcome.told += 1
+                continue
+            outcome.answered += 1
+            given = [each.to_frame() for node in nodes for each in node.made]
+            plain = set().union(*(node.plain for node in nodes))
+            told = [each for each in answers if type(each) not in plain and each.to_frame() not in given]
+            outcome.wrong += [f"{request} got {each}" for each in told]
+        total = pair.master.engine.total
+    outcome.repeats, outcome.timeouts, outcome.faults = total.repeats, total.timeouts, plan.counts.total
+    return outcome
+
+
+def main() -> int:
+    """Run all protocols; return 1 if an answer was wrong."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--transactions", type=int, default=100_000, help="for each protocol")
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    wrong = 0
+    for name in NAMES:
+        begun = time.monotonic()
+        outcome = run(name, arguments.transactions, arguments.seed)
+        print(f"{outcome}; {time.monotonic() - begun:.0f} s", flush=True)
+        for each in outcome.wrong[:3]:
+            print("  ", each)
+        wrong += len(outcome.wrong)
+    return int(wrong > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
