@@ -283,3 +283,18 @@ def test_an_address_is_checked_after_a_payload_that_is_walked() -> None:
     with pytest.raises(codec.DecodeError) as caught:
         codec.decode(wire)
     assert caught.value.kind == "length"
+
+
+def test_the_size_of_a_choice_is_not_called_like_a_function() -> None:
+    """A choice called as had a size called as_bytes, as the function that takes bytes of any kind."""
+    kinds = '{switch: kind, cases: {9: "bytes[0..11]"}, default: "bytes[0..3]"}'
+    bus = "bus: {kind: master_slave, nodes: 1..8}\n"
+    fields = f"{{kind: u8, size: {{type: u16, counts: [as, size]}}, as: {kinds}}}"
+    protocol, faults = loads(
+        f"{_HEAD}{_PARTS}{bus}messages:\n  log: {{id: 5, fields: {fields}}}\n", "whole.yaml"
+    )
+    assert protocol, faults
+    codec = python.load(protocol)
+    message = codec.Log(node=1, kind=2, as_=b"abc")
+    assert message.to_bytes().hex() == "020005616263"
+    assert codec.decode(message.to_frame()) == message

@@ -438,7 +438,7 @@ class Encoder:
         bits, mask = step.item.bits, step.item.mask
         item = f"item & 0x{mask:X}" if step.item.signed else "item"
         number = str(step.length.maximum) if step.fixed else f"{step.name}_count"
-        size = str(packed_size(step.length.maximum, bits)) if step.fixed else f"{step.name}_bytes"
+        size = str(packed_size(step.length.maximum, bits)) if step.fixed else integers.bytes_of(step.name)
         if not step.fixed:
             self._lines.append(f"{size} = {integers.term_text(term_of(step))}")
         if step.number.meaning == "bool":

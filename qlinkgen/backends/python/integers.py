@@ -288,7 +288,8 @@ def count_text(step: CountStep) -> str:
     """What a count tells over the local variables of its run."""
     if not step.sized:
         return term_text(step.term)
-    return f"{step.run}_bytes + {step.term.more}" if step.term.more else f"{step.run}_bytes"
+    size = bytes_of(step.run)
+    return f"{size} + {step.term.more}" if step.term.more else size
 
 
 def own_bytes(term: Term, number: str) -> str:
@@ -308,3 +309,8 @@ def items_text(term: Term, size: str) -> str:
 def size_text(size: Size) -> str:
     """A size as an expression."""
     return " + ".join(size_terms(size))
+
+
+def bytes_of(name: str) -> str:
+    """The local with the number of bytes of a choice, a row or records; `as_bytes` is a function."""
+    return f"{name}_bytes" if name != "as" else "as__bytes"

@@ -95,7 +95,7 @@ def read_lines(
         rest = f"({rest})" if " " in rest else rest
         lines = [f"{limit} = {end}{f' - {rest}' if rest != '0' else ''}", f"if {limit} < at:", wrong]
     elif exact:
-        lines = [f"{limit} = at + {step.name}_bytes", f"if {limit} > {end}:", wrong]
+        lines = [f"{limit} = at + {integers.bytes_of(step.name)}", f"if {limit} > {end}:", wrong]
     given = [kind, place.data, "at", limit]
     target = f"message.{name}, at"
     if isinstance(step, RecordStep):

@@ -79,9 +79,9 @@ class WalkedEncoder(Encoder):
         absent = [f"{run.name}_count = 0"]
         if is_sized(self.message.payload, run.name):
             assert isinstance(run, RecordsStep)
-            octets = f"{run.name}_octets"
-            self._late += [f"{octets} = {octets_of(run, self.place)}", f"{run.name}_bytes = len({octets})"]
-            absent.append(f"{run.name}_bytes = 0")
+            octets, size = f"{run.name}_octets", integers.bytes_of(run.name)
+            self._late += [f"{octets} = {octets_of(run, self.place)}", f"{size} = len({octets})"]
+            absent.append(f"{size} = 0")
         lines = self._flushed()
         if run.presence is None or run.presence.slot:
             return lines
@@ -116,7 +116,7 @@ class WalkedEncoder(Encoder):
 
     def _ahead(self, cases: Sequence[Segment]) -> list[str]:
         """The statements that encode a choice before the count of its bytes."""
-        octets, size = f"{cases[0].slot}_octets", f"{cases[0].slot}_bytes"
+        octets, size = f"{cases[0].slot}_octets", integers.bytes_of(cases[0].slot)
         return ['data = b""', *self._choice(cases), f"{octets} = data", f"{size} = len({octets})"]
 
     def _choice(self, cases: Sequence[Segment]) -> list[str]:
@@ -262,7 +262,8 @@ class WalkedDecoder(Decoder):
         if cases[0].counted:
             slot = cases[0].slot
             self._end = f"{slot}_end"
-            limit = [f"{self._end} = at + {slot}_bytes", f"if {self._end} > end:", self._bad_layout]
+            begun = f"{self._end} = at + {integers.bytes_of(slot)}"
+            limit = [begun, f"if {self._end} > end:", self._bad_layout]
             lines = [*limit, *self._cases(cases), f"if at != {self._end}:", self._bad_layout]
             self._end = "end"
             return lines

@@ -62,7 +62,7 @@ class _Measure:
         lines = [f"{each.name}_raw = 0" for each in absent]
         for segment, cases in by_choice(segments):
             if segment.counted:
-                size = f"{segment.slot}_bytes"
+                size = integers.bytes_of(segment.slot)
                 lines += [f"size += {size}", f"start += {size}"]
                 continue
             for each in cases or (segment,):
@@ -113,8 +113,8 @@ class _Measure:
             return [*more, *inner.lines(renamed(step.record.segments, suffix), ())]
         counted = step.length.minimum if present else 0
         if (step.name, True) in self._known:
-            more = [f"size += {step.name}_bytes - {counted * own.least}"]
-            return [*more, f"start += {step.name}_bytes"]
+            more = [f"size += {integers.bytes_of(step.name)} - {counted * own.least}"]
+            return [*more, f"start += {integers.bytes_of(step.name)}"]
         last = renamed_tests(step.last, suffix)
         inner = _Measure(bounded=True, depth=self._depth + 1)
         lines = [f"size += {own.least}"]
@@ -170,7 +170,7 @@ class _Measure:
 
 def sized_lines(step: CountStep, number: str, otherwise: str) -> list[str]:
     """The statements that take the bytes of walked records from a count, and check them."""
-    more, size = step.term.more, f"{step.run}_bytes"
+    more, size = step.term.more, integers.bytes_of(step.run)
     bounds = Within(step.bounds.low - more, step.bounds.high - more)
     first = f"{size} = {integers.own_bytes(step.term, number)}"
     return [first, f"if {integers.broken(bounds, size)}:", otherwise]
