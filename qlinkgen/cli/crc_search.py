@@ -72,7 +72,7 @@ def _fits(check: Check, received: int, covers: Sequence[Coverage], limit: int) -
         steps = each.steps + (algorithm is not algorithms[0])
         if steps > limit:
             continue
-        value = algorithm.compute(each.data) & check.mask
+        value = check.sent(algorithm.compute(each.data))
         for suffix, wanted, extra in orders:
             if value == wanted and steps + extra <= limit:
                 yield Fit(f"{algorithm.name}{each.text}{suffix}", steps + extra)
@@ -94,7 +94,7 @@ def flipped_bit(check: Check, received: int, data: bytes) -> tuple[int, int] | N
     for index, bit in itertools.product(range(len(data)), range(8)):
         repaired = bytearray(data)
         repaired[index] ^= 1 << bit
-        if check.algorithm.compute(repaired) & check.mask == received:
+        if check.sent(check.algorithm.compute(repaired)) == received:
             return index, repaired[index]
     return None
 
@@ -113,7 +113,7 @@ def explain_mismatch(
     if fits := search(check, received, covers):
         return f"it matches {', or '.join(fit.text for fit in fits)}: the sender may use that"
     data = bytes(value for _, value in own)
-    expected = check.algorithm.compute(data) & check.mask
+    expected = check.sent(check.algorithm.compute(data))
     if (expected ^ received).bit_count() == 1:
         return "one bit of the check value itself was flipped on the wire"
     if (flipped := flipped_bit(check, received, data)) and own[flipped[0]][0] >= 0:
@@ -134,7 +134,7 @@ def explain_sum(check: Check, id_name: str, request: bytes, answer: bytes, recei
         received: The value that was received.
     """
     start, words = request[0], request[1:]
-    expected = check.of(words, answer, start=start) & check.mask
+    expected = check.sent(check.of(words, answer, start=start))
     if check.unpack(check.pack(received)[::-1]) == expected:
         return "its bytes are swapped"
     readings = {
@@ -143,7 +143,7 @@ def explain_sum(check: Check, id_name: str, request: bytes, answer: bytes, recei
         "the sum of only the request": check.of(words, start=start),
         "the sum of single bytes": sum(request + answer),
     }
-    fitting = [text for text, value in readings.items() if value & check.mask == received]
+    fitting = [text for text, value in readings.items() if check.sent(value) == received]
     if fitting:
         return f"it matches {fitting[0]}: the device may use that"
     if (received ^ expected).bit_count() == 1:

@@ -42,12 +42,24 @@ class Checksum:
     otherwise: int | None = None
     #: Size of the blocks of the covered part that have a value each, 0 for one value over all parts.
     every: int = 0
-    #: Each chunk of four bits is sent as a hexadecimal digit.
-    digits: bool = False
+    #: It is sent as digits of this base, 0 if it is not. A chunk is a hexadecimal digit of four bits, or the
+    #: whole value for each decimal digit.
+    base: Literal[0, 10, 16] = 0
+
+    @property
+    def modulus(self) -> int:
+        """What is sent of decimal digits is the remainder of the value by this; 0 for others."""
+        return int(10**self.size) if self.base == 10 else 0
+
+    def sent(self, value: int) -> int:
+        """A value as far as it is sent."""
+        return value % self.modulus if self.modulus else value & self.mask
 
     @property
     def mask(self) -> int:
         """The bits that are sent."""
+        if self.base == 10:
+            return self.algorithm.mask
         return sum(chunk.mask << chunk.shift for chunk in self.chunks)
 
     @property
@@ -58,16 +70,18 @@ class Checksum:
     @property
     def regular(self) -> ByteOrder | None:
         """Byte order of a check value that is sent whole; None if bits are omitted or regrouped."""
-        return Integer(self.algorithm.width, False, self.chunks).byteorder
+        return None if self.base else Integer(self.algorithm.width, False, self.chunks).byteorder
 
     def pack(self, value: int) -> bytes:
-        """The wire bytes of a check value; bits that are not sent are dropped."""
+        """The wire bytes of a check value; bits or digits that are not sent are dropped."""
+        if self.base == 10:
+            return b"%0*d" % (self.size, self.sent(value))
         data = pack_chunks(value, self.chunks)
-        return bytes(b"0123456789ABCDEF"[each] for each in data) if self.digits else data
+        return bytes(b"0123456789ABCDEF"[each] for each in data) if self.base else data
 
     def normal(self, data: bytes) -> bytes:
         """Received bytes as they are sent: digits in upper case."""
-        return data.upper() if self.digits else data
+        return data.upper() if self.base == 16 else data
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,9 +74,15 @@ class Check:
         """The wire bytes of a value."""
         return self.value.pack(value)
 
+    def sent(self, value: int) -> int:
+        """A value as far as it is sent."""
+        return self.value.sent(value)
+
     def unpack(self, data: bytes) -> int:
         """The value of wire bytes; bits that are not sent are 0."""
-        if self.value.digits:
+        if self.value.base == 10:
+            return int(data) if data.isdigit() else 0
+        if self.value.base:
             return int(data, 16) if data.isalnum() and not data.upper().strip(b"0123456789ABCDEF") else 0
         return unpack_chunks(data, self.value.chunks)
 

@@ -509,7 +509,8 @@ def check_text(check: Check, frame: FramePlan) -> str:
     if check.chained:
         words = f"every {check.word}-byte word" if check.word > 1 else "every byte"
         return f"{check.algorithm.name} of {frame.id_name} and {words}, written or read"
-    digits = f", as {check.size} digits" if check.value.digits else ""
+    kinds = {0: "", 10: f", as {check.size} decimal digits", 16: f", as {check.size} digits"}
+    digits = kinds[check.value.base]
     return f"{check.algorithm.name} over {', '.join(check.over)}{digits}"
 
 

@@ -202,7 +202,9 @@ class PartSpec(Fact):
         default=None, description="Bit ranges of the checksum that are sent, one per byte"
     )
     as_: str | None = Field(
-        default=None, alias="as", description="Form of the checksum: hex[2], two hexadecimal digits"
+        default=None,
+        alias="as",
+        description="Form of the checksum: hex[2] or decimal[3], two or three digits",
     )
     only: list[str] | None = Field(default=None, description="Messages with the checksum; default: all")
     words: Annotated[StrictInt, Field(ge=1, le=8)] = Field(1, description="Size of the words that a sum adds")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from typing import Literal
 
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.frame import ATTRIBUTE, Checksum, Derivation, Part, Role, Silence
@@ -23,6 +25,9 @@ from qlinkgen.schema.types import TypeBuilder
 
 #: The least number that hands over to a longer length: one below it states a size other than 0.
 _LEAST_OTHERWISE = 2
+#: Decimal digits of a checksum; as many as the widest one may have.
+_DECIMAL = re.compile(r"\s*decimal\s*\[\s*([1-9]|1[0-9]|20)\s*\]\s*", re.ASCII)
+_MOST_DIGITS = 20
 _INTEGERS = {f"u{8 * size}": size for size in range(1, 9)}
 _SINGLE_ROLES = (
     "length",
@@ -382,7 +387,7 @@ class PartBuilder:
             spec.confirmed,
             self._otherwise(spec, algorithm, path),
             spec.every or 0,
-            digits=spec.as_ is not None,
+            base=_base(spec.as_),
         )
 
     def _otherwise(self, spec: PartSpec, algorithm: catalogue.Checksum, path: Path) -> int | None:
@@ -422,13 +427,23 @@ class PartBuilder:
         return tuple(Chunk(first, last + 1 - first) for first, last in spec.sent)
 
     def _as_digits(self, spec: PartSpec, scalar: Scalar, path: Path) -> tuple[Chunk, ...]:
-        """The hexadecimal digits of a checksum."""
+        """The digits of a checksum."""
         self.reject(spec, ("byteorder", "sent", "every"), "digits", path)
+        if found := _DECIMAL.fullmatch(spec.as_ or ""):
+            return (Chunk(0, scalar.bits),) * int(found[1])
         right = f"hex[{scalar.bits // 4}]"
         if (spec.as_ or "").replace(" ", "") != right:
             what = f"a checksum of {scalar.bits} bits is not {shown(spec.as_)}"
-            self._report.error("bad-digits", (*path, "as"), what, f"write as: {right}", needs=(path,))
+            hint = f"write as: {right}, or decimal[N] with up to {_MOST_DIGITS} digits"
+            self._report.error("bad-digits", (*path, "as"), what, hint, needs=(path,))
         return tuple(Chunk(shift, 4) for shift in range(scalar.bits - 4, -1, -4))
+
+
+def _base(form: str | None) -> Literal[0, 10, 16]:
+    """The base of the digits of a checksum, 0 if it is sent as bytes."""
+    if form is None:
+        return 0
+    return 10 if _DECIMAL.fullmatch(form) else 16
 
 
 def _roles(specs: Mapping[str, PartSpec], path: Path) -> Iterator[tuple[str, str, Path]]:

@@ -86,8 +86,8 @@ def _bytes_of(part: Part, frame: DelimitedFrame, messages: Sequence[Message]) ->
             return separators | _joined(bytes_in(field) for message in messages for field in message.fields)
         case "checksum":
             assert part.checksum is not None
-            if part.checksum.digits:
-                return frozenset(b"0123456789ABCDEFabcdef")
+            if part.checksum.base:
+                return frozenset(b"0123456789" if part.checksum.base == 10 else b"0123456789ABCDEFabcdef")
             return _joined(frozenset(range(chunk.mask + 1)) for chunk in part.checksum.chunks)
         case "length":
             assert part.scalar is not None

@@ -96,6 +96,15 @@ SHAPES = {
     head: {type: u16, algorithm: crc-16/modbus, over: [length, code]}
     data: {role: payload, size: 0..40}
 """,
+    "in decimal digits, all and the last ones": """\
+    start: 02
+    code: {role: message, type: u8}
+    length: {type: u8, counts: [data]}
+    data: {role: payload, size: 0..40}
+    sum: {type: u8, as: "decimal[3]", algorithm: sum8, over: [code, length, data]}
+    crc: {type: u16, as: "decimal[4]", algorithm: crc-16/modbus, over: [code, length, data]}
+    end: 0D
+""",
     "two of one algorithm in a stuffed frame": """\
     start: A5 A5
     length: {type: u8, counts: [data]}
@@ -128,6 +137,21 @@ def test_a_frame_by_hand() -> None:
     # 03 ^ 05 = 06; AA + 06 + 01 + 02 + 03 = 00B6.
     frame = bytes.fromhex("aa 03 05 06 010203 00b6")
     assert Codec(plan(_TWO)).encode("log", {"note": b"\1\2\3"}) == frame
+
+
+def test_decimal_digits() -> None:
+    found = plan(SHAPES["in decimal digits, all and the last ones"])
+    frame = Codec(found).encode("log", {"note": b"\1\xff"})
+    # 05 + 02 + 01 + FF = 107, without the carry 007; of the five digits of the CRC, the last four are sent.
+    crc = find("crc-16/modbus").compute(frame[1:5])
+    assert frame == bytes.fromhex("02 05 02 01ff") + b"007" + str(crc)[-4:].encode() + b"\r"
+    codec = python.load(found.protocol)
+    assert codec.Log(note=b"\1\xff").to_frame() == frame
+    for wrong in (frame[:-2] + b"x\r", frame.replace(b"007", b"\x00\x00\x07")):
+        with pytest.raises(BadFrame, match="crc"):
+            Codec(found).decode(wrong, "request")
+        with pytest.raises(codec.DecodeError, match="check"):
+            codec.decode_request(wrong)
 
 
 def test_numbers_that_are_not_sent() -> None:

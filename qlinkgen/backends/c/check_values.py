@@ -237,7 +237,7 @@ class CheckWriter(Places):
 
 def put_check(check: Check, place: str, at: int, value: str) -> list[str]:
     """Statements that write a check value."""
-    if check.value.digits:
+    if check.value.base:
         return [f"{place}[{at + index}] = {digit};" for index, digit in enumerate(_digits(check, value))]
     return [
         f"{place}[{at + index}] = (uint8_t)({_piece(value, chunk.shift, chunk.mask)});"
@@ -247,8 +247,10 @@ def put_check(check: Check, place: str, at: int, value: str) -> list[str]:
 
 def differs(check: Check, place: str, at: int, value: str) -> str:
     """The condition for received check bytes that differ from ``value``; digits may have either case."""
-    if check.value.digits:
+    if check.value.base:
         found = [(f"{place}[{at + index}]", digit) for index, digit in enumerate(_digits(check, value))]
+        if check.value.base == 10:
+            return any_of(f"{seen} != {digit}" for seen, digit in found)
         return any_of(f"({seen} != {digit}) && ({seen} != ({digit} | 0x20U))" for seen, digit in found)
     return any_of(
         f"{place}[{at + index}] != (uint8_t)({_piece(value, chunk.shift, chunk.mask)})"
@@ -257,7 +259,14 @@ def differs(check: Check, place: str, at: int, value: str) -> str:
 
 
 def _digits(check: Check, value: str) -> list[str]:
-    """The hexadecimal digits of a value as characters."""
+    """The digits of a value as characters."""
+    if check.value.base == 10:
+        width = max(16, check.algorithm.width)
+        places = [10**power for power in reversed(range(check.size))]
+        most = check.algorithm.mask
+        parts = [value if power == 1 else f"({value} / {unsigned(power, width)})" for power in places]
+        found = zip(places, parts, strict=True)
+        return [f"(uint8_t)(0x30U + ({part} % 10U))" if most >= power else "0x30U" for power, part in found]
     pieces = [f"({_piece(value, chunk.shift, chunk.mask)})" for chunk in check.value.chunks]
     return [f"(uint8_t)({each} + (({each} > 9U) ? 0x37U : 0x30U))" for each in pieces]
 

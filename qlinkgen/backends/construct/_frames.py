@@ -313,6 +313,8 @@ class Check(NamedTuple):
     otherwise: int | None = None
     #: It is sent as hexadecimal digits; those received may be in lower case.
     digits: bool = False
+    #: It is sent as decimal digits of the remainder by this, 0 if it is not.
+    modulus: int = 0
 
     def differs(self, cells: Mapping[str, bytes], expected: bytes) -> bool:
         """Whether the received value is another one."""
@@ -321,7 +323,8 @@ class Check(NamedTuple):
 
     def packed(self, value: int) -> bytes:
         """The wire bytes of a check value."""
-        return bytes(self.integer.build(value & self.mask))
+        sent = value % self.modulus if self.modulus else value & self.mask
+        return bytes(self.integer.build(sent))
 
     def value(self, cells: Mapping[str, bytes], request: bytes) -> bytes:
         """The wire bytes of the check value of a frame in cells."""

@@ -319,9 +319,11 @@ def _check(part: CheckPart, envelope: Envelope, algorithms: Algorithms) -> Call:
     check = part.check
     kind = integer(Integer(8 * check.size, signed=False, chunks=check.value.chunks))
     digits: tuple[tuple[str, Node], ...] = ()
-    if check.value.digits:
-        limits = (("low", 0), ("high", check.mask))
-        kind, digits = Call("TextNumber", (16, check.size, check.size), limits), (("digits", True),)
+    if base := check.value.base:
+        modulus = check.value.modulus
+        limits = (("low", 0), ("high", modulus - 1 if modulus else check.mask))
+        kind = Call("TextNumber", (base, check.size, check.size), limits)
+        digits = (("modulus", modulus),) if modulus else (("digits", True),)
     over = Sequence((envelope.payload.name,) if check.chained else check.over)
     word = (("word", check.word),) if check.chained else ()
     rejected = (("rejected", check.rejected),) if check.rejected is not None else ()

@@ -63,7 +63,10 @@ def _parameters(algorithm: Algorithm) -> list[str]:
 
 def check_bytes(check: Check, number: str = "crc") -> str:
     """Expression for the wire bytes of a check value."""
-    if check.value.digits:
+    if modulus := check.value.modulus:
+        number = f"({number} % {modulus})" if check.algorithm.mask >= modulus else number
+        return f'b"%0{check.size}d" % {number}'
+    if check.value.base:
         return f'b"%0{check.size}X" % {number}'
     if check.regular:
         return f'{number}.to_bytes({check.size}, "{check.regular}")'
@@ -78,7 +81,7 @@ def placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> Pl
     covered = _covered(envelope, part, "frame")
     seeded, main = part in envelope.seeded, part is envelope.check
     checksum = "checksum" if main else f"_CHECKSUM{mark}"
-    case = ".upper()" if part.check.value.digits else ""
+    case = ".upper()" if part.check.value.base == 16 else ""
     result = f"crc = {checksum}.compute({covered}, {checksum}.start)"
     wrong = f"{view.bytes} != frame[{start}:{end}]{case}"
     if view.order and view.size <= 2:

@@ -168,7 +168,7 @@ def _unique(plan: Plan, receiver: Hunt, title: str, sizes: Sequence[int]) -> Uni
 
 def _check_letter(check: Check, byteorder: ByteOrder) -> str:
     """Format of the check value in the byte order of the module, "" if struct has none."""
-    if check.size > 1 and check.regular != byteorder:
+    if check.value.base or (check.size > 1 and check.regular != byteorder):
         return ""
     return {1: "B", 2: "H", 4: "I"}.get(check.size, "")
 

@@ -120,6 +120,8 @@ def part_of(name: str, spec: object, order: str, fields: Fields) -> Part:
         pieces = tuple((first, last + 1 - first) for first, last in map(whole_span, spec["sent"]))
     if "as" in spec:
         pieces = tuple((at, 4) for at in range(bits_of_type(spec["type"]) - 4, -1, -4))
+        if (digits := spec["as"].removeprefix("decimal[").rstrip("]")).isdecimal():
+            pieces = ((0, bits_of_type(spec["type"])),) * int(digits)
     if "every" in spec:
         return Part(name, "blocks", 0, spec, pieces=pieces)
     bits = tuple((role, shift, size, inner) for _, role, shift, size, inner in bits_of(spec))
@@ -133,6 +135,8 @@ def part_of(name: str, spec: object, order: str, fields: Fields) -> Part:
 
 def _shown(check: Part, value: int) -> bytes:
     """The bytes of a check value."""
+    if check.spec.get("as", "").startswith("decimal"):
+        return f"{value:0{len(check.pieces)}d}"[-len(check.pieces) :].encode()
     if "as" in check.spec:
         return f"{value:0{len(check.pieces)}x}".upper().encode()
     return put(check.pieces, value)
