@@ -23,6 +23,9 @@ from hypothesis import HealthCheck, Phase, settings
 
 from tests.support import needs
 
+#: Tests read every schema, and write nothing to the user's folders.
+os.environ["QLINKGEN_CACHE"] = ""
+
 NO_SKIPS = os.environ.get("QLINKGEN_NO_SKIPS", "") not in {"", "0"}
 
 # The notice travels as text: under xdist a report is all that reaches the process that prints the summary.

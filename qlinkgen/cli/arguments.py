@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
+import importlib
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 
 import click
 
 from qlinkgen._resources import library_dir, schemas_dir
-from qlinkgen.cli import completion
 from qlinkgen.cli.boundary import Failure
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
+#: Completes a word of a parameter.
+Complete: TypeAlias = "Callable[[click.Context, click.Parameter, str], list[CompletionItem]]"
+
+
+def _completing(name: str) -> Complete:
+    """Return a function of `qlinkgen.cli.completion`, which only shells need."""
+
+    def complete(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        module = importlib.import_module("qlinkgen.cli.completion")
+        found: list[CompletionItem] = getattr(module, name)(context, parameter, incomplete)
+        return found
+
+    return complete
 
 
 def _protocol(context: click.Context, parameter: click.Parameter, value: str) -> str:  # noqa: ARG001
@@ -32,14 +51,16 @@ def _is_schema(name: str) -> bool:
 
 
 #: PROTOCOL.
-protocol_argument = click.argument("protocol", shell_complete=completion.protocols)
+protocol_argument = click.argument("protocol", shell_complete=_completing("protocols"))
 #: PROTOCOL of a command that has a port too.
-driven_protocol_argument = click.argument("protocol", callback=_protocol, shell_complete=completion.protocols)
+driven_protocol_argument = click.argument(
+    "protocol", callback=_protocol, shell_complete=_completing("protocols")
+)
 #: PORT.
-port_argument = click.argument("port", shell_complete=completion.ports)
+port_argument = click.argument("port", shell_complete=_completing("ports"))
 #: [MESSAGE], after PROTOCOL.
-message_argument = click.argument("message", required=False, shell_complete=completion.messages)
+message_argument = click.argument("message", required=False, shell_complete=_completing("messages"))
 #: [FIELD=VALUE]..., after MESSAGE.
 assignments_argument = click.argument(
-    "assignments", metavar="[FIELD=VALUE]...", nargs=-1, shell_complete=completion.assignments
+    "assignments", metavar="[FIELD=VALUE]...", nargs=-1, shell_complete=_completing("assignments")
 )

@@ -25,7 +25,7 @@ _VERSION = re.compile(r"[0-9]{1,9}(\.[0-9]{1,9}){0,5}", re.ASCII)
 
 def find_schema(name: str) -> Path:
     """Return the file of a schema, given by shipped name or path."""
-    from qlinkgen.schema import find  # noqa: PLC0415  # pydantic is slow to import
+    from qlinkgen.schema import find  # noqa: PLC0415  # not needed by all commands
 
     try:
         return find(name)
@@ -35,11 +35,16 @@ def find_schema(name: str) -> Path:
 
 def load_protocol(name: str, crc: str | None = None, version: str | None = None) -> Protocol:
     """Load a protocol by shipped name or path. Raises SchemaError."""
-    from qlinkgen.schema import load  # noqa: PLC0415  # pydantic is slow to import
+    from qlinkgen.cli.model_cache import keep, recall  # noqa: PLC0415  # JSON is not needed by all commands
 
     path = find_schema(name)
+    if crc is None and (kept := recall(path, version)) is not None:
+        return kept
+    from qlinkgen.schema import load  # noqa: PLC0415  # pydantic is slow to import
+
     protocol = load(path, version=version)
     if crc is None:
+        keep(path, version, protocol)
         return protocol
     from qlinkgen.plan.framing import frame_plan  # noqa: PLC0415  # only this option needs the plan
 

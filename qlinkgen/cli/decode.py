@@ -86,7 +86,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     chunks = _input(hex_, raw=raw)
     loaded = load_protocol(protocol, crc, version)
-    codec = load_codec(loaded)
+    codec = load_codec(loaded, plain=crc is None)
     if name is not None:
         message = turned_message(loaded, name)
         stream: Stream = Alone(codec, message.name, proving(loaded, codec, message, request))

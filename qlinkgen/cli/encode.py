@@ -79,7 +79,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen encode mc1231a get_pos.response --request 4a value=1234567
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc, version)
-    codec, found, built = compose(loaded, message, assignments, addresses, object_)
+    codec = load_codec(loaded, plain=crc is None)
+    _, found, built = compose(loaded, message, assignments, addresses, object_, codec=codec)
     try:
         click.echo(_frame(loaded, codec, found, built, request).hex())
     except codec.EncodeError as error:

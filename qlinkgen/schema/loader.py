@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
 
-from qlinkgen._resources import library_dir, schemas_dir
 from qlinkgen.errors import Fault, SchemaError
 from qlinkgen.model.frame import Frame, FrameKinds
 from qlinkgen.model.protocol import Protocol
@@ -26,7 +25,7 @@ from qlinkgen.schema.notation import Version
 from qlinkgen.schema.notation import version as as_version
 from qlinkgen.schema.part_types import place_part_types
 from qlinkgen.schema.reading import read_regular, reason_of
-from qlinkgen.schema.report import Reporter, did_you_mean
+from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.response_forms import with_forms
 from qlinkgen.schema.seeds import check_references, check_types
 from qlinkgen.schema.shared_proofs import with_shared_proofs
@@ -39,31 +38,6 @@ from qlinkgen.schema.types import TypeBuilder
 from qlinkgen.schema.unconfirmed import report_unconfirmed
 from qlinkgen.schema.unknown import UnknownBuilder
 from qlinkgen.schema.versions import FIRST, boundaries, check_lifetimes, in_version
-
-
-def shipped() -> tuple[str, ...]:
-    """Names of the protocols whose code is in the package."""
-    return tuple(sorted(path.stem for path in schemas_dir().glob("*.yaml")))
-
-
-def library() -> tuple[str, ...]:
-    """Names of the public protocols in the package."""
-    return tuple(sorted(path.stem for path in library_dir().glob("*.yaml")))
-
-
-def find(protocol: str) -> FilePath:
-    """The file of a schema in the package, or of a path. Raises SchemaError for an unknown name."""
-    path = FilePath(protocol)
-    if "/" in protocol or path.suffix:
-        return path
-    for folder in (schemas_dir(), library_dir()):
-        if (file := folder / f"{protocol}.yaml").is_file():
-            return file
-    names = (*shipped(), *library())
-    hint = did_you_mean(
-        protocol, names, "`qlinkgen list` names those of qlinkgen; or give the path of a .yaml file"
-    )
-    raise SchemaError([Fault(protocol, 1, 1, "file-unreadable", "unknown schema", hint)])
 
 
 def lint(path: FilePath | str, *, version: str | None = None) -> list[Fault]:

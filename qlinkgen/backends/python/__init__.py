@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import copy
-import importlib.resources
 import linecache
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from types import ModuleType
 
 from qlinkgen.backends.base import Outputs, copied
@@ -34,7 +34,7 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
     """The module of a protocol and the files of its package, by path."""
     text = render(plan_of(protocol, options))
     support = sorted({f"{name}.py" for name in re.findall(r"^ *from \.(_\w+) import", text, re.MULTILINE)})
-    folder = importlib.resources.files(__package__)
+    folder = Path(__file__).parent
     return {
         f"{options.package}/{file_stem(protocol.name)}.py": text,
         **{
