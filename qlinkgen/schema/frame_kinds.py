@@ -360,8 +360,6 @@ def _excess(part: Part) -> str:
     """What kinds of frame do not have, "" if the part is right."""
     if part.role == "terminator" and part.shared:
         return "may begin the next frame"
-    if part.when:
-        return "depends on a value of the header"
     if part.trim is not None:
         return "is trimmed"
     if part.checksum and part.checksum.every:

@@ -385,3 +385,51 @@ messages:
     codec = Codec(plan_of(protocol))
     assert codec.encode("tell", {"level": 5}) == bytes.fromhex("22 01 01 05")
     assert codec.encode("other", {"level": 5}) == bytes.fromhex("11 01 01 05")
+
+
+CONDITIONAL = """
+qlinkgen: 1
+protocol: {name: conditional, revision: "1", source: Made up}
+byteorder: big
+frames:
+  data:
+    parts:
+      start: 68
+      length: {type: u8, counts: data}
+      state: {type: u8, bits: {timed: {at: 0, type: bool}, signed: {at: 1, type: bool}}}
+      hops: {type: u8, default: 3, if: timed}
+      data: {role: payload, size: 0..20}
+      sum: {type: u8, algorithm: sum8, over: [state, hops, data]}
+      stamp: {type: u16, if: signed}
+      seal: {type: u8, algorithm: xor8, over: [data, stamp], if: signed}
+  ack: {parts: {byte: 06}}
+bus: {kind: host}
+defaults: {repeat: safe}
+commands: {}
+messages:
+  note: {frame: data, direction: response, fields: {text: bytes}}
+  taken: {frame: ack, direction: response, fields: {}}
+"""
+
+
+def test_values_of_the_header_decide_about_parts_of_a_kind() -> None:
+    protocol, faults = loads(CONDITIONAL, "conditional.yaml")
+    assert protocol is not None, faults
+    plan, generated = plan_of(protocol), load_codec(protocol)
+    codec = Codec(plan)
+    plain = codec.encode("note", {"text": b"\x06"})
+    signed = codec.encode("note", {"text": b"\x06", "timed": 1, "signed": 1, "hops": 7, "stamp": 0x102})
+    assert plain == bytes.fromhex("68 01 00 06 06")
+    assert signed == bytes.fromhex("68 01 03 07 06 10 01 02 05")
+    note = generated.Note(text=b"\x06", timed=True, signed=True, hops=7, stamp=0x102)
+    assert (generated.encode(generated.Note(text=b"\x06")), generated.encode(note)) == (plain, signed)
+    wrong = signed[:-1] + b"\xff"
+    stream = wrong + plain + b"\x06" + signed
+    heard = generated.StreamDecoder("response").feed(stream)
+    found = [event.decoded.message.name if event.decoded else event.kind
+             for event in receiver(plan, "response").run(stream)]  # fmt: skip
+    assert [getattr(each, "NAME", "") or each.kind for each in heard] == found
+    assert found == ["crc", "taken", "note", "taken", "note"]
+    assert (heard[2].hops, heard[2].stamp, heard[4].hops, heard[4].stamp) == (3, 0, 7, 0x102)
+    with pytest.raises(generated.EncodeError):
+        generated.encode(generated.Note(text=b"", stamp=1))

@@ -158,7 +158,7 @@ def _payload_lines(names: Names, own: str, plan: MessagePlan) -> tuple[list[str]
     if is_trimmed(plan.payload):
         return _trimmed_lines(names, own, plan, call), "size"
     size, fits = f"{constant}_MAX_SIZE", f"capacity >= {constant}_MAX_FRAME_SIZE"
-    if plan.envelope.conditional:
+    if any(each.envelope.conditional for each in plan.frames):
         fits = f"{own}_fits_(capacity, {size})"
     lines = []
     if message.variable:

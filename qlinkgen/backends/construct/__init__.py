@@ -44,6 +44,7 @@ _SUPPORT = {
     "_ftexts": "BetweenField Letters Separated TextList TextNumber Word",
     "_kinds": "Kind Kinds Turned",
     "_fended": "CodedKind EndedKind",
+    "_fpresent": "ConditionalKind",
     "_ftrimmed": "Trimmed",
     "_fwalks": "TerminatedBytes TerminatedText Walked",
     "_fvaried": "One Several SizeOf Varied VariedRecord",
@@ -63,6 +64,7 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
     names = {name for each in everything for name in used(each.node)}
     if names & {*_SUPPORT["_ffilled"].split()}:
         names |= {"Record", "Trimmed", "Varied"}
+    names |= {"ConditionalFrame"} if "ConditionalKind" in names else set()
     names |= {"EndedFrame"} if names & {"CodedKind", "EndedKind"} else set()
     # Records that are read one by one are walked.
     names |= {"Walked"} if names & {*_SUPPORT["_fvaried"].split()} else set()

@@ -67,6 +67,7 @@ def live(protocol: Protocol, options: Options | None = None) -> Live:
         "_fconditional",
         "_kinds",
         "_fended",
+        "_fpresent",
     )
     modules = ("construct", *(f"{__package__}.{name}" for name in own))
     names: dict[str, Value] = {"Decimal": Decimal, "float": float}

@@ -234,6 +234,8 @@ def _kinds(plan: Plan, direction: Direction, messages: Mapping[str, str]) -> Cal
         settings |= {} if kind.envelope.preamble else {"starts": kind.envelope.starts}
         name = "CodedKind" if isinstance(kind.transparency, Coded) else "Kind"
         settings |= dict(_stuffing(kind))
+        if present := tuple(map(_present, kind.envelope.conditional)):
+            name, settings = "ConditionalKind", {"present": Sequence(present), **settings}
         if kind.whole:
             name = "EndedKind"
             settings |= dict(_ended_at(kind))

@@ -260,7 +260,7 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
 
 def parts_of_kind(plan: Plan, frame: FramePlan, result: str) -> PartsView:
     """The view of one of several kinds of frame; ``result`` as in `OfKind`."""
-    envelope = frame.envelope
+    envelope = frame.envelope.inner
     view = _parts(replace(plan, frames=dict.fromkeys(plan.frames, frame)), "", bare=False, verified=True)
     base = f"{frame.base} + " if frame.base else ""
     numbers = [pieces.number(envelope, envelope.id, source) for source in ("head", "frame")]

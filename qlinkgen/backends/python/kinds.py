@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import assert_never
 
 from qlinkgen.backends.python import integers, pieces, values
-from qlinkgen.backends.python.check_views import CheckView
+from qlinkgen.backends.python.check_views import CheckView, PlacedCheck
+from qlinkgen.backends.python.conditional import AfterView, after_view
 from qlinkgen.backends.python.decode import Decoder
 from qlinkgen.backends.python.encode import Encoder
 from qlinkgen.backends.python.frame_checks import seed_name
@@ -57,6 +58,7 @@ class KindView:
         seeded: check values cover attributes of the message.
         checked_values: statements that convert and check the values of the frame of ``message``.
         held_values: statements that set the values of ``message`` from ``frame``.
+        holds: it has values.
         turned: only its turn in a dialogue tells it, so decoders of frames do not know it.
     """
 
@@ -68,6 +70,7 @@ class KindView:
     seeded: bool
     checked_values: Sequence[str]
     held_values: Sequence[str]
+    holds: bool
     turned: bool
 
     @property
@@ -203,7 +206,7 @@ def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
         lasts=list(dict.fromkeys(last for view in views.values() for last in _lasts(view.parts))),
         eager=any(_is_eager(view.parts) for view in views.values()),
         check=check,
-        makers=frozenset(each.view.maker for view in views.values() for each in view.parts.checks),
+        makers=frozenset(each.view.maker for view in views.values() for each in _every_check(view.parts)),
     )
 
 
@@ -234,10 +237,24 @@ def _seeds(frame: FramePlan) -> Iterator[Seed]:
         yield from frame.envelope.seeds(part)
 
 
+def _of_message(after: AfterView) -> AfterView:
+    """The view with statements of functions of ``message`` in place of methods."""
+    octets, taken = (
+        [line.replace("self.", "message.").replace("(self)", "(message)") for line in lines]
+        for lines in (after.octets, after.taken)
+    )
+    return replace(after, octets=octets, taken=taken)
+
+
 def _unreplaced(view: PartsView) -> PartsView:
     """The view of a frame whose check value no algorithm can replace."""
     assert view.kind is not None
     return replace(view, kind=replace(view.kind, passes=False))
+
+
+def _every_check(view: PartsView) -> Sequence[PlacedCheck]:
+    """The check values of frames, those included that only some have."""
+    return [*view.checks, *(view.after.checks if view.after else ())]
 
 
 def _lasts(view: PartsView) -> Iterator[str]:
@@ -254,17 +271,21 @@ def _is_eager(view: PartsView) -> bool:
 
 
 def _kind(frame: FramePlan, plan: Plan, make: Maker) -> KindView:
-    envelope = frame.envelope
+    envelope = frame.envelope.inner
     carried = next((each for each in plan.messages if frame in each.frames), None)
-    members = Members(envelope, carried, make) if carried and envelope.values else None
+    members = Members(envelope, carried, make) if carried and frame.envelope.values else None
+    after = after_view(frame.envelope, carried, make.place, make.scale) if carried else None
     address = pieces.number(envelope, envelope.address, "frame") if envelope.address else "None"
     result = f"message.from_bytes(payload{f', {address}' if plan.frame.address else ''})"
+    if members:
+        result = f"_held({result}, frame{', whole' if after and after.values else ''})"
     return KindView(
         name=frame.name,
-        parts=parts_of_kind(plan, frame, f"_held({result}, frame)" if members else result),
+        parts=replace(parts_of_kind(plan, frame, result), after=after and _of_message(after)),
         numbers=list(_numbers(envelope)),
         checked_values=members.checked if members else [],
         held_values=members.held if members else [],
+        holds=members is not None,
         seeded=bool(envelope.seeded),
         front=" + ".join(_bytes(part) for part in envelope.front) or 'b""',
         back=" + ".join(_bytes(part) for part in envelope.back),
@@ -339,7 +360,10 @@ def _number(part: LengthPart | CellPart | EqualPart) -> str:
                 if part.bias
                 else "len(payload)"
             )
-            return f"({counted}) // {part.scale}" if part.scale > 1 else counted
+            counted = f"({counted}) // {part.scale}" if part.scale > 1 else counted
+            if part.otherwise is None:
+                return counted
+            return f"{counted} if {counted} <= {part.most} else {part.otherwise}"
         case CellPart():
             terms = [_bits(slot) for slot in part.slots]
             return terms[0].removeprefix("(").removesuffix(")") if len(terms) == 1 else " | ".join(terms)

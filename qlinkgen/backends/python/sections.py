@@ -87,7 +87,10 @@ class Sections:
         for kind in (each for each in view.kinds if not each.turned):
             made = definitions(self._rendered("delimited", kind.parts, owner="Message"))
             search = definitions(self._rendered("delimited_search", kind.parts))
-            ways, wraps = Ways(frozenset({*made, *search, "_held"})), needed(made, ["_wrapped"])
+            ways, wraps = (
+                Ways(frozenset({*made, *search, "_held", "_after"})),
+                needed(made, ["_wrapped", "_complete", "_sent"]),
+            )
             finds = needed({**made, **search}, ["_split", "_judge"])
             wrapping.append(merged({kind.name: wraps}, ways).strip())
             if kind in view.found:

@@ -8,6 +8,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
+from tests.support.whole import conditional
 from tests.support.whole.frames import Shape, draw_algorithm, order, width_type
 from tests.support.whole.mixed import draw_value
 
@@ -88,6 +89,7 @@ def draw(rng: random.Random) -> Kinds:
         families.append(_coded(coded, frames, leads.pop(), families[0].shape.bus))
     _add_one_way(random.Random(repr(more.getstate())), frames, families)
     _add_codings(random.Random(f"codings {more.getstate()!r}"), frames)
+    _add_conditions(random.Random(f"conditions {more.getstate()!r}"), frames, families)
     mixed = list(frames)
     rng.shuffle(mixed)
     return Kinds({name: frames[name] for name in mixed}, families)
@@ -233,6 +235,31 @@ def _coded(rng: random.Random, frames: Doc, lead: str, bus: str) -> Family:
         parts["close"]["value"] = "80"
     frames["coded"] = {"parts": parts, "coding": coding}
     return Family(shape, "coded")
+
+
+def _add_conditions(rng: random.Random, frames: Doc, families: list[Family]) -> None:
+    """Let values of the header, or a length, decide about parts of one kind of frame."""
+    able = [each for each in families if each.name and not each.ended and "coding" not in frames[each.name]]
+    able = [each for each in able if {"length", "data"} <= frames[each.name]["parts"].keys()]
+    able = [each for each in able if not each.shape.seeds]
+    if able and rng.random() < 0.5:
+        parts: Doc = frames[able[0].name]["parts"]
+        _name_roles(parts)
+        conditional.add(rng, frames[able[0].name])
+        for name, spec in parts.items():
+            if spec.keys() == {"role", "value"}:
+                parts[name] = spec["value"]
+
+
+def _name_roles(parts: Doc) -> None:
+    """Write out the roles that keys tell, and constants as mappings."""
+    for name, spec in parts.items():
+        if isinstance(spec, str):
+            parts[name] = {"role": "constant", "value": spec}
+        elif "role" not in spec:
+            told = (("counts", "length"), ("algorithm", "checksum"), ("value", "constant"))
+            role = next((role for key, role in told if key in spec), "")
+            parts[name] = {"role": role, **spec} if role else spec
 
 
 def _add_codings(rng: random.Random, frames: Doc) -> None:

@@ -11,7 +11,7 @@ from tests.support.whole.reference.fields import Fields, bits_of
 from tests.support.whole.reference.forms import with_forms
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.kinds import Kinds, address_of
-from tests.support.whole.reference.layouts import Message
+from tests.support.whole.reference.layouts import Message, Test
 from tests.support.whole.reference.notation import Direction, Doc, load, part_doc, whole_span
 from tests.support.whole.reference.parties import asks, has_parties
 from tests.support.whole.reference.receivers import (
@@ -66,8 +66,9 @@ class Reference:
                 carried = [each for each in self.messages if name in each.frames]
                 carried = [each for each in carried if each.direction in (direction, "message")]
                 frame.seeds = {each.number: document.seeds(data, each.name) for each in carried}
+        found = [(each, kinds.way(each)[each.frames[0]]) for each in self.messages]
         self.messages = tuple(
-            replace(each, beside=kinds.way(each)[each.frames[0]].beside) for each in self.messages
+            replace(each, beside=frame.beside, depending=_depending(frame)) for each, frame in found
         )
 
     def _read(self, data: Doc) -> None:
@@ -118,8 +119,6 @@ class Reference:
         frame = self.frame_of(message.direction)
         if not isinstance(frame, Frame):
             return message
-        parts = (part for part in frame.parts if part.name in frame.tests and part.values)
-        depending = [(name, frame.tests[part.name]) for part in parts for name, *_ in part.values]
         stated = document.settled(self.data, message)
         beside = tuple(
             (name, replace(kind, low=stated[name], high=stated[name], default=stated[name]))
@@ -127,7 +126,7 @@ class Reference:
             else (name, kind)
             for name, kind in frame.beside
         )
-        return replace(message, beside=beside, depending=tuple(depending))
+        return replace(message, beside=beside, depending=_depending(frame))
 
     def known(self, direction: Direction) -> dict[int, Message]:
         """The messages of a direction by their number, of several kinds of frame by any."""
@@ -240,3 +239,9 @@ class Reference:
     def events(self, direction: Direction, stream: bytes, asked: Sequence[bytes] = ()) -> list[Event]:
         """The events of a receiver, including those at the end of the stream."""
         return self.receiver(direction, asked).run(stream)
+
+
+def _depending(frame: Frame) -> tuple[tuple[str, tuple[Test, ...]], ...]:
+    """The values that only some frames have, with the tests for their parts."""
+    parts = (part for part in frame.parts if part.name in frame.tests and part.values)
+    return tuple((name, frame.tests[part.name]) for part in parts for name, *_ in part.values)
