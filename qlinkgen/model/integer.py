@@ -8,13 +8,14 @@ from functools import cached_property
 from typing import Literal
 
 from qlinkgen.model.digits import Digits
+from qlinkgen.model.scientific import Scientific
 from qlinkgen.model.words import Words
 
 ByteOrder = Literal["big", "little"]
 #: Order of numbers of a few bits in a row of bits: the first one is in the least, or most, significant bits.
 BitOrder = Literal["least", "most"]
 #: How a number is written as text.
-TextForm = Digits | Words
+TextForm = Digits | Words | Scientific
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from qlinkgen.model.digits import Digits
+from qlinkgen.model.scientific import Scientific
 from qlinkgen.model.types import Float, Scalar
 from qlinkgen.schema.constants import MAX_BITS, MAX_CHARACTERS
 from qlinkgen.schema.notation import shown
@@ -21,6 +22,12 @@ _TEXT = re.compile(
     r"(?P<name>decimal|hex)(?:\[\s*(?P<least>[0-9]{1,3})\s*(?:\.\.\s*(?P<most>[0-9]{1,3})\s*)?\])?\Z",
     re.ASCII,
 )
+
+
+#: The form of floating-point numbers.
+SCIENTIFIC = "scientific"
+#: The bits of the greatest number of a width.
+_GREATEST = {32: 0x7F7F_FFFF, 64: 0x7FEF_FFFF_FFFF_FFFF}
 
 
 def formed(scalar: Scalar, spec: FieldSpec, base: str, location: Location, *, grouped: bool) -> Scalar:
@@ -46,13 +53,18 @@ def formed(scalar: Scalar, spec: FieldSpec, base: str, location: Location, *, gr
 def _text(scalar: Scalar, spec: FieldSpec, base: str, location: Location) -> Scalar:
     """A number that is sent as text."""
     assert spec.as_ is not None
+    if spec.as_.strip() == SCIENTIFIC:
+        return _scientific(scalar, spec, base, location)
     match = _TEXT.match(spec.as_.strip())
     if match is None:
-        hint = did_you_mean(spec.as_, ["bcd", "decimal", "hex"], "use bcd, decimal, decimal[1..6] or hex[2]")
+        known = ["bcd", "decimal", "hex", SCIENTIFIC]
+        hint = did_you_mean(spec.as_, known, "use bcd, decimal, decimal[1..6], hex[2] or scientific")
         location.fault("bad-value", "as", f"{shown(spec.as_)} is not a form of a number", hint)
         return scalar
     if isinstance(scalar.meaning, Float) or scalar.bits > MAX_BITS:
         hint = f"use an integer of up to {MAX_BITS} bits, with a scale such as 1/100"
+        if isinstance(scalar.meaning, Float):
+            hint = f"{hint}, or as: {SCIENTIFIC}"
         location.reject(spec, ("as",), base, hint)
         return scalar
     location.reject(spec, ("byteorder",), "text")
@@ -71,6 +83,19 @@ def _text(scalar: Scalar, spec: FieldSpec, base: str, location: Location) -> Sca
     natural = text.natural_minimum, text.natural_maximum
     low, high = (scalar.minimum, scalar.maximum) if scalar.meaning == "bool" else natural
     return replace(text, minimum=low, maximum=high)
+
+
+def _scientific(scalar: Scalar, spec: FieldSpec, base: str, location: Location) -> Scalar:
+    """A floating-point number with a decimal exponent; infinities and NaN have no such text."""
+    kind = scalar.meaning
+    if not isinstance(kind, Float) or scalar.bits not in _GREATEST:
+        location.reject(spec, ("as",), base, "use f32 or f64, or as: decimal")
+        return scalar
+    location.reject(spec, ("byteorder",), "text")
+    location.reject(spec, ("const", "reserved"), "a floating-point number as text")
+    most = kind.value(_GREATEST[scalar.bits])
+    finite = replace(kind, bounds=(-most, most))
+    return replace(scalar, chunks=(), text=Scientific(scalar.bits), meaning=finite)
 
 
 def _point(scalar: Scalar, spec: FieldSpec, location: Location) -> int | None:

@@ -366,6 +366,18 @@ class MessageBuilder:
             what = f"{message.name} can have as few as {least} bytes"
             hint = f"the frame requires {low}; lengthen a field by {low - least}, or lower this limit"
             self._error("payload-too-short", path, what, hint)
+        elif not least and self._is_terminator(message):
+            what = f"{message.name} can be empty, and nothing else precedes the terminator"
+            self._error("payload-too-short", path, what, "add a field, or a part to the frame")
+
+    def _is_terminator(self, message: Message) -> bool:
+        """Whether an empty message is a terminator alone, perhaps after what begins the frame."""
+        if not isinstance(self._frame, DelimitedFrame):
+            return False
+        parts = self._frame.towards(message.direction).parts
+        end = next((index for index, part in enumerate(parts) if part.role == "terminator"), 0)
+        first = int(parts[0].role == "constant")
+        return end > 0 and not any(part.size for part in parts[first:end])
 
     def _check_trim(self, message: Message, path: Path) -> None:
         """Check that a receiver knows the number of zeros at the end that were not sent."""

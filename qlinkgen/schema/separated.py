@@ -9,6 +9,7 @@ from qlinkgen.model.fields import Field
 from qlinkgen.model.frame import DelimitedFrame, Frame
 from qlinkgen.model.integer import TextForm
 from qlinkgen.model.message import Message
+from qlinkgen.model.scientific import Scientific
 from qlinkgen.model.types import Array, Blob, Scalar
 from qlinkgen.model.words import Words
 from qlinkgen.schema.notation import shown
@@ -98,6 +99,9 @@ def _checked(field: Field, separator: bytes, excluded: bytes, path: Path, report
 
 def _listed(field: Field, kind: Array, separator: bytes, path: Path, report: Reporter) -> Field:
     """A list of texts."""
+    if isinstance(kind.item.text, Scientific):
+        what = f"{field.name} is a list of floating-point numbers as text"
+        report.error(_RULE, path, what, "use a field for each, or as: decimal with a scale", of_key=True)
     if kind.length.counted_by:
         what = f"the number of {field.name} follows from the separators"
         report.error(_RULE, path, what, "remove the count, and write [0..N]", of_key=True)

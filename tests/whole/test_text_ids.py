@@ -31,7 +31,7 @@ commands:
   measure:
     id: "MEAS:VOLT?"
     request: {channel: {type: u8, as: decimal, optional: true}}
-    response: {value: {type: i32, as: decimal, scale: 1/1000}}
+    response: {value: {type: f64, as: scientific}}
   measure_ac:
     id: "MEAS:VOLT:AC?"
     request: {channel: {type: u8, as: decimal, optional: true}}
@@ -111,7 +111,7 @@ def test_frames_by_hand() -> None:
     codec = _codec(_METER)
     assert codec.encode("identify", {}) == b"*IDN?\n"
     assert codec.encode("measure", {"channel": 2}) == b"MEAS:VOLT? 2\n"
-    assert codec.encode("measure.response", {"value": -12300}) == b"-12.300\n"
+    assert codec.encode("measure.response", {"value": 0xC028_99999999_999A}) == b"-1.23E+01\n"
     assert codec.encode("configure", {"mode": 1, "range": 10}) == b"CONF CURR 10\n"
     assert codec.encode("label", {"text": b"a, b"}) == b"DISP:TEXT a, b\n"
     found = codec.decode(b"1.5,CURR\n", "response")

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 from qlinkgen.backends.c.crc import field_check
 from qlinkgen.backends.c.forms import Helper, decimal_helpers, row_helpers, wide_helpers
 from qlinkgen.backends.c.names import storage, unsigned, unsigned_type
-from qlinkgen.backends.c.text_forms import Verb, form_of, needed_with, text_helpers
+from qlinkgen.backends.c.text_forms import REAL, Verb, form_of, needed_with, text_helpers
 from qlinkgen.backends.c.words import word_helpers
 from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.digits import Digits
 from qlinkgen.model.integer import BitOrder, Chunk, Integer, TextForm
+from qlinkgen.model.scientific import Scientific
 from qlinkgen.model.types import Scalar
 from qlinkgen.model.words import Words
 
@@ -109,6 +110,10 @@ class Layouts:
             self._words.add((text, verb))
             place = given[:1] if verb == "put" else ()
             return f"{self.prefix}_{verb}_word_{text.enum}_({', '.join([*place, given[-1]])})"
+        if isinstance(text, Scientific):
+            self._texts |= needed_with(REAL, verb)
+            wide = given[-1] if text.bits == 64 else f"(uint64_t){given[-1]}"
+            return f"{self.prefix}_{verb}_real_({', '.join([*given[:-1], wide, _width(text)])})"
         key, form = form_of(text) if verb != "size" else (text.base, "hex" if text.base == 16 else "decimal")
         self._texts |= needed_with(key, verb)
         name = f"{self.prefix}_{verb}_{form}_"
@@ -126,6 +131,10 @@ class Layouts:
         """An expression for the unsigned value of a text."""
         if isinstance(text, Words):
             return self._word(text, place, size)
+        if isinstance(text, Scientific):
+            self._texts |= needed_with(REAL, "get")
+            call = f"{self.prefix}_get_real_({place}, {size}, {_width(text)})"
+            return call if text.bits == 64 else f"(uint32_t){call}"
         call = self._text_call("get", integer, text, place, size)
         if integer.signed and integer.bits != storage(integer.bits):
             call = f"({call} & {unsigned((1 << integer.bits) - 1, 64, hexadecimal=True)})"
@@ -135,6 +144,9 @@ class Layouts:
         """A condition that holds where a text is not a number that the integer can hold."""
         if isinstance(text, Words):
             return f"{self._word(text, place, size)} > {text.highest}U"
+        if isinstance(text, Scientific):
+            self._texts |= needed_with(REAL, "get")
+            return f"!{self.prefix}_is_real_({place}, {size}, {_width(text)})"
         return f"!{self._text_call('is', integer, text, place, size)}"
 
     def _word(self, words: Words, place: str, size: str) -> str:
@@ -275,3 +287,8 @@ def _placed(index: int, chunk: Chunk, kind: str) -> str:
         f"at[{index}]" if chunk.bits == 8 else f"(at[{index}] & {unsigned(chunk.mask, 8, hexadecimal=True)})"
     )
     return f"({kind})(({kind}){byte} << {chunk.shift})" if chunk.shift else f"({kind}){byte}"
+
+
+def _width(text: Scientific) -> str:
+    """Bits of the significand of a floating-point number, the hidden one included."""
+    return "53U" if text.bits == 64 else "24U"

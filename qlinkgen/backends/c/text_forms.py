@@ -6,6 +6,7 @@ from collections.abc import Collection
 from typing import Literal
 
 from qlinkgen.backends.c.forms import Helper
+from qlinkgen.backends.c.real_texts import PUT, READ
 from qlinkgen.model.digits import Digits
 
 #: A function that a header needs: it reads, writes, or tells the number of characters.
@@ -239,6 +240,9 @@ static inline size_t {p}_texts_(const uint8_t *text, size_t size, uint8_t separa
 #: In place of a base: a decimal number after spaces.
 _SPACED = -10
 
+#: In place of a base: a floating-point number.
+REAL = 2
+
 _TEXTS = {
     (0, "get"): _CELLS,
     (10, "get"): _READ_DECIMAL,
@@ -249,6 +253,8 @@ _TEXTS = {
     (16, "get"): _READ_HEX,
     (16, "put"): _PUT_HEX,
     (16, "size"): _SIZE_HEX,
+    (REAL, "get"): READ,
+    (REAL, "put"): PUT,
 }
 
 
@@ -262,6 +268,8 @@ def form_of(text: Digits) -> tuple[int, str]:
 def needed_with(key: int, verb: Verb) -> set[tuple[int, Verb]]:
     """A function and those that it calls."""
     found: set[tuple[int, Verb]] = {(key, verb)}
+    if key == REAL:
+        return {(key, "get")} if verb == "get" else {(key, "get"), (key, "put")}
     if key == _SPACED:
         found |= {(10, "put"), (10, "size")} if verb == "put" else {(10, "get")}
     return found
@@ -274,6 +282,7 @@ def text_helpers(prefix: str, needed: Collection[tuple[int, Verb]]) -> list[Help
         10: "A decimal number as text",
         _SPACED: "A decimal number after spaces",
         16: "A hexadecimal number as text",
+        REAL: "A floating-point number as text",
     }
     return [
         Helper(names[key[0]], tuple(text.format(p=prefix).splitlines()))

@@ -41,7 +41,7 @@ _SUPPORT = {
     "_fconditional": "ConditionalFrame Present",
     "_fasked": "Asked Told",
     "_frecords": "Record",
-    "_ftexts": "BetweenField Letters Separated TextList TextNumber Word",
+    "_ftexts": "BetweenField Letters Separated TextList TextNumber TextReal Word",
     "_kinds": "Kind Kinds Turned",
     "_fended": "CodedKind EndedKind",
     "_fpresent": "ConditionalKind",

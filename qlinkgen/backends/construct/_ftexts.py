@@ -5,8 +5,11 @@ Copied next to the modules that need it, unchanged.
 
 from __future__ import annotations
 
+import math
 import re
+import struct
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any, BinaryIO
 
 from construct import (
@@ -30,6 +33,7 @@ from construct import (
 from ._fields import Message, Row, TextField, Values, _innermost
 
 _DECIMAL = re.compile(rb"[+-]?([0-9]*)\.?([0-9]*)\Z")
+_REAL = re.compile(rb"[+-]?(?=\.?[0-9])([0-9]*)\.?([0-9]*)(?:[Ee]([+-]?[0-9]+))?\Z")
 _HEXADECIMAL = re.compile(rb"[0-9A-Fa-f]+\Z")
 
 
@@ -154,6 +158,70 @@ class Word(Construct):
         if not isinstance(obj, int) or not 0 <= obj < len(self.words):
             raise IntegerError(f"{obj!r} is not the number of a word", path=path)
         text = self.words[obj]
+        stream_write(stream, text, len(text), path)
+        return obj
+
+    def _sizeof(self, context: Container, path: str) -> int:
+        return self.maximum
+
+
+class TextReal(Construct):
+    """A floating-point number of 32 or 64 bits as text with a decimal exponent.
+
+    It is built with the fewest digits with which it is parsed as the same number.
+    """
+
+    minimum = 1
+    maximum = 24
+
+    def __init__(self, bits: int) -> None:
+        super().__init__()
+        self.form = ">f" if bits == 32 else ">d"
+        # Bits of the significand, and the exponent of the last bit of the smallest numbers.
+        self.size, self.last = (24, -149) if bits == 32 else (53, -1074)
+
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> float:
+        text = stream_read_entire(stream, path)
+        number = self._nearest(text)
+        if number is None:
+            raise ValidationError(f"{text!r} is not a number in range", path=path)
+        return number
+
+    def _nearest(self, text: bytes) -> float | None:
+        found = _REAL.match(text)
+        if found is None:
+            return None
+        sign = -1.0 if text[:1] == b"-" else 1.0
+        digits, exponent = int(found[1] + found[2]), int(found[3] or b"0")
+        if digits == 0 or exponent < -9999:
+            return sign * 0.0
+        if exponent > 9999:
+            return None
+        value = digits * Fraction(10) ** (exponent - len(found[2]))
+        width = value.numerator.bit_length() - value.denominator.bit_length()
+        unit = max(self.last, width - self.size)
+        steps = round(value / Fraction(2) ** unit)
+        if steps >> self.size:
+            unit += 1
+            steps = round(value / Fraction(2) ** unit)
+        try:
+            number = math.ldexp(steps, unit)
+            struct.pack(self.form, number)
+        except OverflowError:
+            return None
+        return sign * number
+
+    def _build(
+        self, obj: object, stream: BinaryIO, context: Container, path: str
+    ) -> object:
+        if not isinstance(obj, int | float) or not math.isfinite(obj):
+            raise IntegerError(f"{obj!r} is not a finite number", path=path)
+        try:
+            number = struct.unpack(self.form, struct.pack(self.form, obj))[0]
+        except OverflowError as error:
+            raise IntegerError(f"{obj!r} is too large", path=path) from error
+        texts = (b"%.*E" % (after, number) for after in range(17))
+        text = next(text for text in texts if self._nearest(text) == number)
         stream_write(stream, text, len(text), path)
         return obj
 

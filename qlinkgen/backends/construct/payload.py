@@ -16,6 +16,7 @@ from qlinkgen.model.fields import Layout, greatest_size
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import record_key
+from qlinkgen.model.scientific import Scientific
 from qlinkgen.model.types import Characters, Enum, Flags, Float, Scalar, byte_chunks
 from qlinkgen.model.values import native_from_raw
 from qlinkgen.model.words import Words
@@ -54,6 +55,8 @@ def integer(kind: Integer, *, signed: bool | None = None) -> Node:
     signed = kind.signed if signed is None else signed
     if isinstance(kind.text, Words):
         return Call("Word", kind.text.words)
+    if isinstance(kind.text, Scientific):
+        return Call("TextReal", (kind.bits,))
     if text := kind.text:
         limits = (("low", kind.minimum), ("high", kind.maximum))
         point = (("point", text.point),) if text.point else ()

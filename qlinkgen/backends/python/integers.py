@@ -9,6 +9,7 @@ from typing import assert_never
 from qlinkgen.backends.python.layout import slice_of
 from qlinkgen.model import naming
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer
+from qlinkgen.model.scientific import Scientific
 from qlinkgen.model.words import Words
 from qlinkgen.plan.expr import Clear, Condition, Legible, OneOf, Size, Term, Within
 from qlinkgen.plan.payload import CountStep
@@ -83,6 +84,7 @@ def text_of(integer: Integer, number: str) -> str:
     assert text is not None
     if isinstance(text, Words):
         return f"{words_of(text)}[{number}]"
+    assert not isinstance(text, Scientific)  # floats, not integers, are written
     if text.point and text.spaced:
         return f"decimal({number}, 1, {text.point}).rjust({text.least})"
     if text.point and integer.minimum < 0:
@@ -106,6 +108,7 @@ def number_in(integer: Integer, text: str) -> str:
     assert integer.text
     if isinstance(integer.text, Words):
         return f"{numbers_of(integer.text)}.get({text}, {integer.maximum + 1})"
+    assert not isinstance(integer.text, Scientific)  # floats, not integers, are read
     text = f'{text}.lstrip(b" ")' if integer.text.spaced else text
     if integer.text.base == 16:
         return f"read_hexadecimal({text}, {integer.maximum})"

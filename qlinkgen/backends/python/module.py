@@ -52,6 +52,7 @@ _SHARED: Mapping[str, Sequence[str]] = {
         "wrong_check",
         "xor_of",
     ),
+    "_reals": ("read_real", "real"),
     "_digits": ("BetweenRule", "decimal", "read_decimal", "read_hexadecimal", "start_of"),
     "_filled": ("differing",),
     "_rchoices": ("ChoiceRule",),

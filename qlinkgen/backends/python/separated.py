@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import assert_never
 
-from qlinkgen.backends.python import integers
+from qlinkgen.backends.python import floats, integers
 from qlinkgen.backends.python.decode import assigned, assigned_targets, converted
 from qlinkgen.backends.python.layout import in_hex, indented, literal, wrapped
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.walked import WalkedDecoder, WalkedEncoder
 from qlinkgen.model.integer import Integer
+from qlinkgen.model.types import Float
 from qlinkgen.plan.expr import Size, Within
 from qlinkgen.plan.payload import BytesStep, ConstantStep, ItemsStep, ReservedStep, ValueStep
 from qlinkgen.plan.separated import (
@@ -23,6 +24,9 @@ from qlinkgen.plan.separated import (
     open_list,
     text_steps,
 )
+
+#: Bits of a single-precision number.
+_SINGLE = 32
 
 
 @dataclass
@@ -63,6 +67,10 @@ class SeparatedEncoder(WalkedEncoder):
                 text = raw
             case ValueStep():
                 raw = f"{step.name}_raw"
+                if isinstance(kind := step.number.meaning, Float):
+                    self._terms += floats.holds(kind, source)
+                    text = f"{self.place.use('real')}({source}, {kind.bits == _SINGLE})"
+                    return self._absent_or([*self._flushed(), f"{local} = {text}"], step, local)
                 if step.number.scaling is not None:
                     self._lines.append(f"{raw} = {self.scales[step.name]}.raw({source})")
                 else:
@@ -71,10 +79,14 @@ class SeparatedEncoder(WalkedEncoder):
                 text = integers.to_bytes(step.integer, raw)
             case _:
                 assert_never(step)
-        lines = [*self._flushed(), f"{local} = {text}"]
+        return self._absent_or([*self._flushed(), f"{local} = {text}"], step, local)
+
+    @staticmethod
+    def _absent_or(lines: list[str], step: TextStep, local: str) -> list[str]:
+        """The statements of a text; none if it is absent."""
         if step.presence is None:
             return lines
-        return [f'{local} = b""', f"if {source} is not None:", *indented(lines)]
+        return [f'{local} = b""', f"if self.{attribute(step.name)} is not None:", *indented(lines)]
 
     def _list(self, step: ItemsStep) -> list[str]:
         """Statements that assign the numbers of a list; adds their conditions."""
@@ -174,6 +186,8 @@ class SeparatedDecoder(WalkedDecoder):
                 raw = self._read(step.integer, step.name, offset)
                 for rule in step.conditions:
                     self._refuse(integers.broken(rule, raw), step.name, raw, offset)
+            case ValueStep() if isinstance(kind := step.number.meaning, Float):
+                self._real(step, kind, target, offset)
             case ValueStep():
                 raw = self._read(step.integer, step.name, offset)
                 for rule in step.conditions:
@@ -192,6 +206,14 @@ class SeparatedDecoder(WalkedDecoder):
         if step.presence is None:
             return lines
         return [f"if {local}:", *indented(lines), "else:", f"    {target} = None"]
+
+    def _real(self, step: ValueStep, kind: Float, target: str, offset: str) -> None:
+        """Read a floating-point number."""
+        raw, text = f"{step.name}_raw", f"{step.name}_text"
+        self._values.append(f"{raw} = {self.place.use('read_real')}({text}, {kind.bits == _SINGLE})")
+        for rule in floats.holds(kind, raw):
+            self._refuse(f"not {rule}", step.name, text, offset)
+        self._values.append(f"{target} = {raw}")
 
     @property
     def _separator(self) -> int:

@@ -14,6 +14,8 @@ from tests.support.whole.frames import Shape
 
 Doc = dict[str, Any]
 _INTEGERS = ("u8", "u8", "i8", "u16", "i16", "u24", "i24", "u32", "i32", "u40", "i48", "u56", "u64", "i64")
+#: Maximum number of characters of a floating-point number.
+_REAL = 24
 #: Maximum number of records inside each other.
 _DEPTH = 3
 _SCALES = (("1/10", 10), ("1/2^8", 256), ("0.5", 2), ("5", 1), ("-1/4", 4), ("1/1000", 1000), ("1/3", 3))
@@ -586,7 +588,24 @@ class FieldMaker:
                 made[self.words.name(taken)] = spec
                 room.left -= size + 1
         self._opened(made)
-        return made
+        return self._with_real(made, room, taken)
+
+    def _with_real(self, made: Doc, room: Room, taken: set[str]) -> Doc:
+        """Perhaps one more field, of a floating-point number."""
+        # Drawn from another source: the schemas of earlier seeds stay what they are.
+        rng = random.Random(repr(self.rng.getstate()))
+        name = next(each for each in ("reading", "reading_2", "reading_3") if each not in taken)
+        if rng.random() < 0.6 or room.left <= _REAL or {f"{name}_count", f"{name}_size"} & taken:
+            return made
+        spec: Doc = {"type": rng.choice(("f32", "f64")), "as": "scientific"}
+        spec |= rng.choice(({}, {}, {"range": "-10..1000"}, {"default": 1.5}, {"default": -2.5e-7}))
+        spec |= {"optional": True} if rng.random() < 0.4 else {}
+        taken.add(name)
+        room.left -= _REAL + 1
+        names = list(made)
+        at = rng.randint(0, max(0, len(names) - 1))
+        before, after = ({each: made[each] for each in part} for part in (names[:at], names[at:]))
+        return {**before, name: spec, **after}
 
     def _opened(self, made: Doc) -> None:
         """A list at the end may have fewer items."""

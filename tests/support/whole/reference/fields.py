@@ -310,6 +310,9 @@ class Fields:
         number = Number(
             bits, signed, pieces, low, high, 0, scale, Fraction(0), truth, forbidden, bcd=bcd, real=real
         )
+        if spec.get("as") == "scientific":
+            most = number.number(0x7F7FFFFF if bits == 32 else 0x7FEFFFFFFFFFFFFF)
+            return replace(number, scientific=True, bounds=(-most, most), pieces=((0, 8),) * 24)
         return _as_text(number, spec) if str(spec.get("as", "bcd")) != "bcd" else number
 
     def _carrier(self, base: str) -> tuple[int, bool, Fraction | None, bool, int]:

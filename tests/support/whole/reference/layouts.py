@@ -42,6 +42,8 @@ class Number:
     #: The integer is the bits of a floating-point number, perhaps with bounds.
     real: bool = False
     bounds: tuple[float, float] | None = None
+    #: A floating-point number is sent as text with a decimal exponent.
+    scientific: bool = False
     #: It is a text of a header, without these characters.
     without: bytes | None = None
 
@@ -260,6 +262,8 @@ class Slot:
         if kind.words:
             sizes = [len(word) for word in kind.words]
             return min(sizes), max(sizes)
+        if kind.scientific:
+            return 1, 24
         assert kind.text
         _, least, most, _, _ = kind.text
         return least if least == most else 1, most

@@ -22,6 +22,7 @@ from tests.support.whole.reference.layouts import (
     most_bytes,
     size_of,
 )
+from tests.support.whole.reference.reals import real_of, real_text
 
 #: A raw value: a number, a list of numbers, bytes, a record, or a list of records.
 Raw: TypeAlias = "int | list[int] | bytes | Mapping[str, Raw] | Sequence[Mapping[str, Raw]] | None"
@@ -298,6 +299,8 @@ def met(tests: Sequence[Test], numbers: Mapping[str, int]) -> bool:
 def _put(number: Number, raw: int) -> bytes:
     if number.words:
         return number.words[raw]
+    if number.scientific:
+        return real_text(number, raw)
     if number.text:
         base, least, _, point, _ = number.text
         if base == 16:
@@ -314,6 +317,8 @@ def _get(number: Number, data: bytes) -> int:
         if data not in number.words:
             raise Wrong("range", str(data))
         return number.words.index(data)
+    if number.scientific:
+        return real_of(number, data)
     if number.text:
         return _of_text(number, data, number.text)
     pattern = get(number.pieces, data)
@@ -563,7 +568,8 @@ def _decoded(slot: Slot, data: bytes, number: int | None) -> dict[str, Raw]:
         return {slot.name: _decoded_run(kind, data, kind.most if number is None else number)}
     if slot.role in ("reserved", "filled"):
         return {}
-    if not (isinstance(kind, Number) and (kind.text or kind.words)) and stray(kind.pieces, data):
+    spelt = isinstance(kind, Number) and bool(kind.text or kind.words or kind.scientific)
+    if not spelt and stray(kind.pieces, data):
         raise Wrong("range", slot.name)
     if isinstance(kind, Packed):
         whole = get(kind.pieces, data)
