@@ -54,11 +54,19 @@ int main(int count, char **asked)
                 const claw_frame_t frame = claw_receiver_frame(&receiver);
                 const size_t size = claw_slave_dispatch(&slave, &frame, wire, sizeof wire);
                 claw_speed_response_t told;
+                claw_turn_t turn;
+                claw_frame_t answer;
                 for (size_t index = 0; index < size; ++index) {
                     printf("%02x", (unsigned)wire[index]);
                 }
-                if (claw_speed_response_decode(&told, wire, size) == CLAW_OK) {
-                    printf(" %d", told.crc == claw_speed_response_check(&frame, wire, size));
+                claw_turn_init(&turn); /* as a master that has sent `speed` */
+                for (size_t index = 0; index < size; ++index) {
+                    if (claw_turn_receive(&turn, CLAW_SPEED_RESPONSE_ID, 0U, wire[index], &answer) ==
+                            CLAW_EVENT_FRAME &&
+                        claw_speed_response_decode(&told, answer.payload, answer.size) == CLAW_OK) {
+                        const uint16_t right = claw_speed_response_check(&frame, answer.payload, answer.size);
+                        printf(" %d", told.crc == right);
+                    }
                 }
                 printf("\n");
             }
