@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from qlinkgen.backends import python
+from qlinkgen.backends import construct, python
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.dissect import dissect
 from qlinkgen.schema import loads
@@ -298,3 +298,19 @@ def test_the_size_of_a_choice_is_not_called_like_a_function() -> None:
     message = codec.Log(node=1, kind=2, as_=b"abc")
     assert message.to_bytes().hex() == "020005616263"
     assert codec.decode(message.to_frame()) == message
+
+
+def test_a_message_without_its_last_zeros_may_fix_a_value_of_its_frame() -> None:
+    """Its structure took no values that are always the same."""
+    parts = "{start: 7E, length: {type: u8, counts: data}, code: {role: message, type: u8}, on: {type: u8}"
+    parts += (
+        ", data: {role: payload, size: 0..8, trim: zeros}, sum: {type: u8, algorithm: sum8, over: [data]}}"
+    )
+    log = "{id: {code: 5, on: 1}, direction: request, fields: {level: u32}}"
+    text = f"{_HEAD}frame: {{parts: {parts}}}\nbus: {{kind: master_slave}}\nmessages: {{log: {log}}}\n"
+    protocol, faults = loads(text, "whole.yaml")
+    assert protocol, faults
+    frames = construct.live(protocol).frames["request"]
+    wire = python.load(protocol).Log(level=0x01000000).to_frame()
+    assert wire.hex() == "7e0105010101"
+    assert frames.parse(wire)["on"] == 1

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from io import BytesIO
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from construct import Container, Renamed, stream_read_entire, stream_write
 
@@ -20,10 +19,9 @@ class Trimmed(Message):
         message_id: int,
         *fields: Renamed,
         keep: int,
-        addresses: Sequence[tuple[int, int]] = (),
-        seeds: Sequence[tuple[str, bytes]] = (),
+        **settings: Any,  # those of a Message
     ) -> None:
-        super().__init__(name, message_id, *fields, addresses=addresses, seeds=seeds)
+        super().__init__(name, message_id, *fields, **settings)
         self.keep = keep
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
