@@ -18,7 +18,8 @@ BRANCH = "\0"
 class FileMapping(BaseModel):
     """One mapping of a schema file: other keys than its own are errors."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+    # Only the validator of the whole file is used, so those of the mappings in it are not built.
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, defer_build=True)
 
 
 #: Types of most attributes.
