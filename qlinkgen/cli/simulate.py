@@ -9,10 +9,11 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, kind_of, shipped_kind
 from qlinkgen.cli.simulating import plan_of
+from qlinkgen.cli.tracing import trace_option
 from qlinkgen.cli.wire_options import seconds
 
 BELONGS: Belongs = {
-    **dict.fromkeys(("nodes", "echo", "value", "file", "memory", "delay", "refuse"), (BUS,)),
+    **dict.fromkeys(("nodes", "echo", "value", "file", "memory", "delay", "refuse", "tap", "traced"), (BUS,)),
     **dict.fromkeys(("ring", "programs", "keys", "closed", "length"), (RING,)),
     "crc": (BUS, RING),
 }
@@ -65,6 +66,13 @@ BELONGS: Belongs = {
 @click.option("--closed", is_flag=True, help="Connect the last node of a ring to the first: no port.")
 @click.option("--seconds", "length", callback=seconds, metavar="SECONDS", help="End a ring after this time.")
 @click.option("--link", type=click.Path(), metavar="PATH", help="Create a symbolic link to the port.")
+@click.option(
+    "--tap",
+    type=click.Path(),
+    metavar="PATH",
+    help="Create a link to a second port, where all bytes of a bus can be read.",
+)
+@trace_option
 @click.option("--faults", metavar="SPEC", help="Faults: drop=0.01,late=0.02:0.05-0.2 or all=0.05.")
 @click.option("--seed", type=int, metavar="N", help="Seed of faults, noise and refusals.")
 @click.option(
@@ -89,6 +97,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     closed: bool,
     length: float | None,
     link: str | None,
+    tap: str | None,
+    traced: bool,
     faults: str | None,
     seed: int | None,
     baud: int | None,
@@ -153,7 +163,16 @@ def command(  # noqa: PLR0917  # click passes them by name
 
         behaviour = Behaviour(value, file, delay, refuse, memory, seed)
         simulate_bus(
-            protocol, nodes, link=link, baud=baud, plan=plan, echo=echo, crc=crc, behaviour=behaviour
+            protocol,
+            nodes,
+            link=link,
+            baud=baud,
+            plan=plan,
+            echo=echo,
+            crc=crc,
+            behaviour=behaviour,
+            tap=tap,
+            traced=traced,
         )
 
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Mapping
 
 from qlinkgen.cli.behaviour import Behaviour, Nodes
 from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import load_protocol
 from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.cli.simulating import run_bus, say
-from qlinkgen.cli.wire_options import counted, parse_nodes, with_crc
+from qlinkgen.cli.tracing import LineTrace
+from qlinkgen.cli.wire_options import ANY_SPEED, counted, parse_nodes, with_crc
 from qlinkgen.link.codec import Codec, Framed
 from qlinkgen.link.slave import Node, SlaveEngine
 from qlinkgen.plan import plan_of
 from qlinkgen.protocols.qlink.facts import NODES
-from qlinkgen.sim import FaultPlan, Wire
+from qlinkgen.sim import OUTSIDE, FaultPlan, Wire
 from qlinkgen.transport.conversation import OTHER_PROGRAM
 
 #: Byte times from a request to its response on a paced line, so that the master can release the line.
@@ -31,9 +34,12 @@ def simulate_bus(
     echo: bool,
     crc: str | None,
     behaviour: Behaviour,
+    tap: str | None = None,
+    traced: bool = False,
 ) -> None:
     """Run the nodes on a pty until a signal."""
     from qlinkgen.sim.pty_bus import PtyBus  # noqa: PLC0415  # needs a system that has ptys
+    from qlinkgen.transport.pty import open_pty  # noqa: PLC0415
 
     codec, numbered, delays = _nodes(protocol, nodes, crc, behaviour)
     bits = codec.BUS.bits_per_byte
@@ -46,7 +52,17 @@ def simulate_bus(
     for engine in engines:
         engine.delays = delays
         wire.attach(engine, f"node {engine.node.number}")
-    run_bus(PtyBus(wire, link=link), link, f"{counted(len(engines), 'node')} of {protocol}")
+    what = f"{counted(len(engines), 'node')} of {protocol}"
+    with contextlib.ExitStack() as ended:
+        if tap is not None:
+            ear = ended.enter_context(open_pty(tap, baud=baud or ANY_SPEED))
+            wire.taps.append(lambda _at, _source, data: ear.write(data))
+        if traced:
+            loaded = load_protocol(protocol, crc)
+            trace = LineTrace(loaded, load_codec(loaded))
+            ended.callback(trace.end)
+            wire.taps.append(lambda at, source, data: trace.hear(at, source == OUTSIDE, data))
+        run_bus(PtyBus(wire, link=link), link, what)
     say(_summary(engines), plan)
 
 
@@ -63,7 +79,6 @@ def _nodes(
             )
         own = _qlink_nodes(parse_nodes(nodes or "1", NODES[0], NODES[-1]))
         return with_crc(qlink, qlink.Codec, crc), own, {}
-    from qlinkgen.cli.codec import load_codec  # noqa: PLC0415  # Q.link does not need the compiler
 
     protocol = load_protocol(name, crc)
     codec = load_codec(protocol)

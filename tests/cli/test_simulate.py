@@ -120,6 +120,25 @@ def test_echo() -> None:
         assert bus.engine._echo.mode == "expect"
 
 
+def test_what_is_on_the_line(tmp_path: Path, qlinkgen: Run) -> None:
+    tap = tmp_path / "tap"
+    with simulated("qlink", "--nodes", "3", "--tap", tap, "--trace", "--baud", "19200") as (path, process):
+        with open_port(str(tap)) as ear:
+            ear.write(b"ignored")
+            done = qlinkgen("send", "qlink", path, "motor_position", "--node", "3", *CALM)
+            assert done.code == 0
+            heard = b""
+            while len(heard) < 18:
+                heard += ear.read(PATIENCE)
+        _, _, err = end(process, signal.SIGTERM)
+    request, answer = qlink.MotorPositionRequest(node=3), qlink.MotorPositionResponse(node=3, position=0)
+    assert heard == request.to_frame() + answer.to_frame()
+    assert f"request   {request.to_frame().hex(' ')} [motor_position.request node 3]\n" in err
+    assert f"answer    {answer.to_frame().hex(' ')} [motor_position.response node 3 position=0]\n" in err
+    assert "1 answer to 1 request" in err
+    assert not os.path.lexists(tap)
+
+
 def test_another_checksum(qlinkgen: Run) -> None:
     with simulated("qlink", "--set", "crc=crc-16/xmodem") as (path, _):
         request = ("send", "qlink", path, "motor_position", "--node", "1", "--echo", "none")
