@@ -164,6 +164,9 @@ class StepMessageSpec(FileMapping):
 
     frame: Name | None = Field(default=None, description="Kind of its frame, if there are several")
     id: AnswerNumber | None = Field(default=None, description="Its number, if it is not that of the request")
+    separator: Separator | None = Field(
+        default=None, description="Character between its fields, if it is not that of the command; none: none"
+    )
     fields: Fields = Field(description="Its fields, in wire order")
 
 

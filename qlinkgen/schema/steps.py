@@ -203,7 +203,7 @@ class StepBuilder:
         if step.last:
             self._sizes[asked.name] = found = sized(fields, frames, step.fields_path, self._report)
             fields, items = found.fields, {name for name, _ in found.sizes}
-        stated = step.message.frame if isinstance(step.message, StepMessageSpec) else None
+        own = step.message if isinstance(step.message, StepMessageSpec) else StepMessageSpec(fields={})
         layout = Written(
             step.name,
             number.of(asked.spec.id),
@@ -211,8 +211,8 @@ class StepBuilder:
             fields,
             step.fields_path,
             items,
-            asked.spec.separator,
-            kind=stated or asked.spec.frame or self._file.defaults.frame,
+            asked.spec.separator if own.separator is None else own.separator,
+            kind=own.frame or asked.spec.frame or self._file.defaults.frame,
             inherited=number.relative,
         )
         direction: Literal["request", "response"] = "request" if sent else "response"

@@ -12,6 +12,7 @@ from qlinkgen.backends.base import Options
 from qlinkgen.errors import Fault
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import plan_of
+from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.content import BadContent, pack, unpack
 from qlinkgen.schema import loads
 
@@ -235,3 +236,32 @@ def test_a_line_of_texts_without_anything_else_leaves_no_variable_unused_in_c() 
     (header,) = c.generate(protocol, Options()).values()
     scan = header.partition("probe_scan_(")[2].partition("\n}")[0]
     assert "status" not in scan
+
+
+def test_a_step_may_have_a_separator_of_its_own() -> None:
+    text = """\
+qlinkgen: 1
+protocol: {name: probe, title: Probe, revision: "1", source: Manual}
+frame:
+  parts:
+    start: {text: "$"}
+    code: {role: message, type: "text[2]"}
+    data: {role: payload, size: 0..40}
+    end: {role: terminator, value: 0D}
+bus: {kind: master_slave, response_within: 100 ms}
+defaults: {repeat: safe}
+commands:
+  set:
+    id: AB
+    separator: ","
+    request: {a: {type: u8, as: decimal}, b: {type: u8, as: decimal}}
+    steps:
+      - name: more
+        send: {id: CD, separator: ";", fields: {a: {type: u8, as: decimal}, b: {type: u8, as: decimal}}}
+      - {name: done, receive: {id: EF, fields: {a: {type: u8, as: decimal}, b: {type: u8, as: decimal}}}}
+"""
+    protocol, faults = loads(text, "probe.yaml")
+    assert protocol is not None, faults
+    codec, values = Codec(plan_of(protocol)), {"a": 1, "b": 2}
+    sent = [codec.encode(name, values) for name in ("set.request", "set.more", "set.done")]
+    assert sent == [b"$AB1,2\r", b"$CD1;2\r", b"$EF1,2\r"]

@@ -433,6 +433,8 @@ class _Maker:
             return None
         make = maker.texts if "separator" in command else maker.fields
         step: Doc = {key: {"id": number, "fields": make(Room.of(shape))}}
+        if "separator" in command and random.Random(repr(rng.getstate())).random() < 0.4:
+            step[key]["separator"] = "|" if command["separator"] != "|" else ";"
         return step | ({"within": rng.choice(("20 ms", "5 bytes"))} if rng.random() < 0.3 else {})
 
     def _last(self, command: Doc, steps: list[Doc]) -> None:

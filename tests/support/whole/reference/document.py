@@ -87,7 +87,7 @@ def with_separator(message: Message, document: Doc) -> Message:
     if reply not in ("", "request", "response"):
         own = document["commands"][name].get("replies", {})
         found = own.get(reply) or document.get("replies", {}).get(reply)
-        places = [found or document["commands"][name]]  # a step has the separator of its command
+        places = [found or _step(document["commands"][name], reply) or document["commands"][name]]
     elif not any(places):
         places = [document["replies"][name]]
     spec = next(each for each in places if each)
@@ -106,6 +106,15 @@ def with_separator(message: Message, document: Doc) -> Message:
     barred = chosen.encode() + end
     slots = tuple(_filled(slot, barred) for slot in message.slots)
     return replace(message, slots=slots, separator=chosen.encode(), leading=leading, barred=barred)
+
+
+def _step(command: Doc, name: str) -> Doc | None:
+    """The frame of a step with a separator of its own; others have that of their command."""
+    for index, step in enumerate(command.get("steps", []), 1):
+        given = step.get("send", step.get("receive"))
+        if step.get("name", f"step_{index}") == name and isinstance(given, dict) and "separator" in given:
+            return given
+    return None
 
 
 def before_end(message: Message, document: Doc) -> Message:
