@@ -7,7 +7,7 @@ from logging import Logger
 from typing import Any, Generic, Self, TypeVar, Unpack
 
 from qlinkgen.bus.making import check_node, make_master, make_peer, open_line
-from qlinkgen.bus.options import BusOptions, LinkOptions, MasterOptions, Parity, PeerOptions
+from qlinkgen.bus.options import BusOptions, LinkOptions, MasterOptions, Parity, PeerOptions, StopBits
 from qlinkgen.bus.watching import Watched
 from qlinkgen.link.codec import Codec, Framed
 from qlinkgen.link.dialogue import Dialogue
@@ -138,7 +138,7 @@ class AsyncBus(AsyncCalls):
         *,
         baud: int | None = None,
         parity: Parity = "none",
-        stop_bits: int = 1,
+        stop_bits: StopBits = 1,
         reopen: bool = False,
         **options: Unpack[BusOptions],
     ) -> Self:
@@ -250,7 +250,7 @@ class AsyncLink(AsyncCalls, AsyncPeer):
         *,
         baud: int | None = None,
         parity: Parity = "none",
-        stop_bits: int = 1,
+        stop_bits: StopBits = 1,
         reopen: bool = False,
         **options: Unpack[LinkOptions],
     ) -> Self:

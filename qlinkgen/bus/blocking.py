@@ -10,7 +10,7 @@ from logging import Logger
 from typing import Any, Generic, Self, TypeVar, Unpack
 
 from qlinkgen.bus.making import check_node, make_master, make_peer, open_line
-from qlinkgen.bus.options import BusOptions, LinkOptions, MasterOptions, Parity, PeerOptions
+from qlinkgen.bus.options import BusOptions, LinkOptions, MasterOptions, Parity, PeerOptions, StopBits
 from qlinkgen.bus.watching import Watched
 from qlinkgen.link.codec import Codec, Framed
 from qlinkgen.link.dialogue import Dialogue
@@ -141,7 +141,7 @@ class Bus(Calls):
         *,
         baud: int | None = None,
         parity: Parity = "none",
-        stop_bits: int = 1,
+        stop_bits: StopBits = 1,
         reopen: bool = False,
         **options: Unpack[BusOptions],
     ) -> Self:
@@ -253,7 +253,7 @@ class Link(Calls, BlockingPeer):
         *,
         baud: int | None = None,
         parity: Parity = "none",
-        stop_bits: int = 1,
+        stop_bits: StopBits = 1,
         reopen: bool = False,
         **options: Unpack[LinkOptions],
     ) -> Self:

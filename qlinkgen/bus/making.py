@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from qlinkgen.bus.options import Parity
+from qlinkgen.bus.options import Parity, StopBits
 from qlinkgen.link.codec import Codec, Module
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.health import HealthPolicy
@@ -18,13 +18,13 @@ from qlinkgen.transport.port import Port
 
 
 def open_line(
-    codec: Module, name: str, *, baud: int | None, parity: Parity, stop_bits: int, reopen: bool
+    codec: Module, name: str, *, baud: int | None, parity: Parity, stop_bits: StopBits, reopen: bool
 ) -> Port:
     """Open a port for a protocol; see `Bus.open`."""
     speed = baud or codec.BUS.baud
     if speed is None:
         raise ValueError("the schema states no speed; pass baud")
-    return open_port(name, baud=speed, parity=parity, stop_bits=2 if stop_bits == 2 else 1, reopen=reopen)
+    return open_port(name, baud=speed, parity=parity, stop_bits=stop_bits, reopen=reopen)
 
 
 def make_master(

@@ -11,6 +11,7 @@ from qlinkgen.link.events import Event, Frame
 from qlinkgen.link.health import HealthPolicy
 
 Parity = Literal["none", "even", "odd"]
+StopBits = Literal[1, 2]
 
 
 class Observers(TypedDict, total=False):

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Literal, Self, Unpack
 
 from qlinkgen.bus.making import open_line
-from qlinkgen.bus.options import Parity, SlaveOptions
+from qlinkgen.bus.options import Parity, SlaveOptions, StopBits
 from qlinkgen.bus.watching import tell_frames, trace
 from qlinkgen.errors import PortLost
 from qlinkgen.link.codec import Codec
@@ -74,7 +74,7 @@ class Slave:
         *handlers: Node,
         baud: int | None = None,
         parity: Parity = "none",
-        stop_bits: int = 1,
+        stop_bits: StopBits = 1,
         **options: Unpack[SlaveOptions],
     ) -> Self:
         """Open a device name or a URL of pyserial; the arguments are those of `Bus.open`."""
@@ -90,7 +90,7 @@ class Slave:
         stop: Callable[[], bool] = lambda: False,
         baud: int | None = None,
         parity: Parity = "none",
-        stop_bits: int = 1,
+        stop_bits: StopBits = 1,
         **options: Unpack[SlaveOptions],
     ) -> None:
         """Open a port and answer there until `stop()` is true, by default as long as the port exists.

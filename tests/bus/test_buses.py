@@ -326,6 +326,8 @@ def test_a_pair_over_a_pty(bus_pair: BusPairs) -> None:
 WRONG: list[tuple[str, Callable[[], object], type[Exception], str]] = [
     ("node", lambda: modbus.Bus(memory_pair()[0]).node(248), ValueError, r"node must be 1\.\.247, not 248"),
     ("option", lambda: modbus.Bus(memory_pair()[0], atempts=3), TypeError, "atempts"),
+    ("stop bits", lambda: modbus.Bus.open("loop://", stop_bits=3), ValueError, "3"),
+    ("parity", lambda: modbus.Bus.open("loop://", parity="evn"), ValueError, "evn"),
     ("attempts", lambda: modbus.Bus(memory_pair()[0], attempts=0), ValueError, "attempts must be 1 or more"),
     ("handlers", lambda: modbus.Slave(memory_pair()[0]), ValueError, "SlaveHandlers"),
     ("name", lambda: modbus.Buss, AttributeError, "has no attribute 'Buss'"),

@@ -10,7 +10,7 @@ from os import PathLike
 from typing import Self, Unpack
 
 from qlinkgen.bus.making import open_line
-from qlinkgen.bus.options import BusOptions, Parity
+from qlinkgen.bus.options import BusOptions, Parity, StopBits
 from qlinkgen.codecs import qlink, qlink_bus
 from qlinkgen.link.procedure import FAILURES
 from qlinkgen.link.transaction import Question, Reply
@@ -67,7 +67,7 @@ class Bus(qlink_bus.Bus):
         *,
         baud: int | None = None,
         parity: Parity = "none",
-        stop_bits: int = 1,
+        stop_bits: StopBits = 1,
         reopen: bool = False,
         **options: Unpack[QlinkOptions],
     ) -> Self:
