@@ -223,6 +223,8 @@ class _Maker:
                 other["response"] = {"frame": name, "fields": fields}
                 kinds.prove(rng, several.frames.get(other.get("frame", ""), {}), fields)
                 given.append(other["response"])
+                if kinds.prove_by_kind(rng, several, other["response"], most):
+                    given.pop()
         if any(each.get("frame") == name for each in given):
             several.frames[name] = {"parts": {"data": {"role": "payload", "size": f"1..{most}"}}}
 

@@ -73,6 +73,23 @@ def _named(document: Doc) -> None:
     document["types"] = {name: each for name, each in types.items() if not _has_roles(each)}
 
 
+def _proven(document: Doc) -> None:
+    """Write a check value over the request, a part of a kind of frame, as the last field of its responses."""
+    for name, frame in document.get("frames", {}).items():
+        (payload, *_), last = frame["parts"], list(frame["parts"])[-1]
+        check = frame["parts"][last]
+        if not isinstance(check, dict) or "request." not in str(check.get("over")):
+            continue
+        del frame["parts"][last]
+        low, high = map(int, frame["parts"][payload]["size"].split(".."))
+        size = int(check["type"][1:]) // 8
+        frame["parts"][payload]["size"] = f"{low + size}..{high + size}"
+        for command in document["commands"].values():
+            response = command["response"]
+            if isinstance(response, dict) and response.get("frame") == name:
+                response["fields"][last] = {**check}
+
+
 def _has_roles(kind: Any) -> bool:
     """Whether the bits of a type, which may be a name in short, have roles."""
     return isinstance(kind, dict) and "'role'" in str(kind.get("bits"))
@@ -82,6 +99,7 @@ def load(text: str) -> Doc:
     """The plain data of a schema file."""
     document: Doc = _newest(yaml.load(text, _Loader))
     _named(document)
+    _proven(document)
     parts = document.get("frame", {}).get("parts", {})
     # Silence has no bytes, and frames end without it unless nothing else ends them.
     for name in [
