@@ -28,8 +28,10 @@ class MessageObject(link.Message, Shape):
         ...
 
 
-def load_codec(protocol: Protocol, *, plain: bool = False) -> ModuleType:
+def load_codec(protocol: Protocol, *, plain: bool = False, only: str = "") -> ModuleType:
     """The generated module of a protocol.
+
+    ``only`` this command or message is needed, "" for all.
 
     ``plain``: the protocol is as its schema says, without another checksum; then the module in the package
     is taken if there is one of this very schema.
@@ -37,8 +39,9 @@ def load_codec(protocol: Protocol, *, plain: bool = False) -> ModuleType:
     if plain and not protocol.version and (kept := _in_package(protocol)) is not None:
         return kept
     from qlinkgen.backends.python import load  # noqa: PLC0415  # Jinja is slow to import
+    from qlinkgen.plan import Options  # noqa: PLC0415  # not needed for the module in the package
 
-    return load(protocol)
+    return load(protocol, Options(only=(only,) if only else ()), laid_out=False)
 
 
 def _in_package(protocol: Protocol) -> ModuleType | None:

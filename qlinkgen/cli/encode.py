@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import ModuleType
 
@@ -79,8 +79,11 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen encode mc1231a get_pos.response --request 4a value=1234567
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc, version)
-    codec = load_codec(loaded, plain=crc is None)
-    _, found, built = compose(loaded, message, assignments, addresses, object_, codec=codec)
+
+    def load(wanted: Message) -> ModuleType:
+        return load_codec(loaded, plain=crc is None, only=wanted.command or wanted.name)
+
+    codec, found, built = compose(loaded, message, assignments, addresses, object_, load=load)
     try:
         click.echo(_frame(loaded, codec, found, built, request).hex())
     except codec.EncodeError as error:
@@ -95,10 +98,11 @@ def compose(
     object_: str | None,
     *,
     codec: ModuleType | None = None,
+    load: Callable[[Message], ModuleType] | None = None,
 ) -> tuple[ModuleType, Message, MessageObject]:
     """Return the codec, the message of a command line, and the object with its values.
 
-    Without ``codec``, the codec is made from the protocol.
+    Without ``codec``, the codec is made by ``load``, by default from the whole protocol.
     """
     if message and "=" in message:
         assignments, message = (message, *assignments), None
@@ -107,7 +111,7 @@ def compose(
     given = {**record.fields, **_assigned(assignments)}
     address = _one(addresses) if addresses else record.address
     warn_unconfirmed(protocol, found)
-    codec = codec or load_codec(protocol)
+    codec = codec or (load_codec(protocol) if load is None else load(found))
     return (
         codec,
         found,

@@ -64,9 +64,9 @@ def _without_texts(protocol: Protocol) -> Protocol:
     return _once(protocol, "without texts", lambda: _strip(protocol))
 
 
-def _render(plan: Plan) -> str:
-    selected = plan.role, tuple(message.name for message in plan.messages)
-    return _once(plan.protocol, selected, lambda: _print(plan))
+def _render(plan: Plan, *, laid_out: bool = True) -> str:
+    selected = plan.role, tuple(message.name for message in plan.messages), laid_out
+    return _once(plan.protocol, selected, lambda: _print(plan, laid_out=laid_out))
 
 
 @functools.lru_cache(maxsize=30)

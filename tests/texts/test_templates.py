@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import importlib.resources
 import sys
 from collections.abc import Callable
@@ -65,7 +64,7 @@ def test_other_settings_or_versions_are_compiled_again(
     rendered: Rendered, compilations: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rendered()
-    monkeypatch.setattr(importlib.metadata, "version", lambda _name: "99")
+    monkeypatch.setattr(templates, "_jinja", lambda: "99")
     rendered()
     monkeypatch.setitem(templates._SETTINGS, "trim_blocks", False)
     assert rendered() == "\n0\n\n1\n\n2\n\n"

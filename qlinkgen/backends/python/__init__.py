@@ -51,14 +51,14 @@ def package(options: Options) -> Outputs:
     return {f"{options.package}/__init__.py": initial, f"{options.package}/py.typed": ""}
 
 
-def load(protocol: Protocol, options: Options | None = None) -> ModuleType:
+def load(protocol: Protocol, options: Options | None = None, *, laid_out: bool = True) -> ModuleType:
     """The generated module, compiled in memory without writing a file.
 
     It runs in this process, so it is generated without text of the schema. Units in its error messages are
-    taken from the model.
+    taken from the model. ``laid_out``: as the file would be, which takes a fifth of the time.
     """
     plain = protocol.without_texts()
-    text = render(plan_of(plain, options))
+    text = render(plan_of(plain, options), laid_out=laid_out)
     module = ModuleType(f"{__package__}.{protocol.name}", None)
     module.__package__ = __package__  # it uses the support module in this folder
     name = f"<{protocol.name}.py generated from {plain.schema_file}>"

@@ -69,9 +69,10 @@ _SHARED: Mapping[str, Sequence[str]] = {
 _ELSEWHERE = {"Decimal", "index", *_STRUCT, *(name for names in _SHARED.values() for name in names)}
 
 
-def render(plan: Plan) -> str:
-    """The text of a protocol's module."""
-    return Module(plan).text()
+def render(plan: Plan, *, laid_out: bool = True) -> str:
+    """The text of a protocol's module; code that is only executed need not be laid out."""
+    text = Module(plan).text()
+    return _tidy(text) if laid_out else text
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,7 @@ class Module:
         self.builder = ClassBuilder(plan, self.place)
 
     def text(self) -> str:
-        """The module's text."""
+        """The module's text, not laid out."""
         plan, models = self.plan, self.builder.build()
         sizes = sorted({each.body_size for each in models if each.body_size is not None})
         title = one_line(plan.protocol.title)
@@ -175,7 +176,7 @@ class Module:
         refusing = sections.ways.of(_placed("unknown.j2", asked), "request")
         template = view.decoder if isinstance(view, PartsView) else view.template
         decoder = _placed(f"{template}_decoder.j2", module, search=sections.search, refusing=refusing).strip()
-        return _tidy(_placed("module.j2", module, frame=sections.frame, decoder=decoder))
+        return _placed("module.j2", module, frame=sections.frame, decoder=decoder)
 
     def _field_checks(self) -> list[str]:
         """Definitions of the algorithms of check values in payloads; complete once the classes are built."""
