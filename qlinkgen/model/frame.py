@@ -153,11 +153,15 @@ class Derivation:
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """A message id of ``least`` to ``most`` characters, with which payloads begin."""
+    """A message id of ``least`` to ``most`` characters, with which payloads begin.
+
+    If it is ``folded``, letters of either case are received.
+    """
 
     name: str
     least: int
     most: int
+    folded: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -68,6 +68,8 @@ class Message:
     decided_by: tuple[Value, ...] = ()
     #: Its id, if payloads begin with ids of several lengths; None for others. Its first field is this text.
     text: bytes | None = None
+    #: Letters of either case are received in it.
+    folded: bool = False
     #: What the frame allows, where all records together may be larger than that; None for others.
     limit: int | None = None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 
@@ -12,10 +13,12 @@ class Words:
     Attributes:
         enum: name of the enum.
         words: in the order of the numbers, each of printable ASCII characters, all different.
+        folded: letters of either case are received.
     """
 
     enum: str
     words: tuple[bytes, ...]
+    folded: bool = False
 
     @property
     def least(self) -> int:
@@ -50,13 +53,13 @@ class Words:
     @property
     def alphabet(self) -> frozenset[int]:
         """The bytes of a text."""
-        return frozenset(b"".join(self.words))
+        return frozenset(b"".join(cased(self.words, folded=self.folded)))
 
     @property
     def wrong(self) -> bytes:
         """A text of the greatest size that is not one of the words."""
         octets = (bytes((each,)) * self.most for each in range(0x21, 0x7F))
-        return next((each for each in octets if each not in self.words), b"\0" * self.most)
+        return next((each for each in octets if self.number(each) is None), b"\0" * self.most)
 
     def text(self, number: int) -> bytes:
         """The word of a number from 0 to ``highest``."""
@@ -64,8 +67,16 @@ class Words:
 
     def number(self, text: bytes) -> int | None:
         """The number of a word, None for other text."""
-        return self.words.index(text) if text in self.words else None
+        words = [each.upper() for each in self.words] if self.folded else self.words
+        text = text.upper() if self.folded else text
+        return words.index(text) if text in words else None
 
     def __str__(self) -> str:
         """The size of the text as written in a schema."""
         return f"text[{self.least}]" if self.fixed else f"text[{self.least}..{self.most}]"
+
+
+def cased(words: Iterable[bytes], *, folded: bool) -> Iterator[bytes]:
+    """The words, in both cases if they are ``folded``."""
+    for word in words:
+        yield from (word.upper(), word.lower()) if folded else (word,)

@@ -43,6 +43,9 @@ def build_enum(name: str, spec: EnumSpec, report: Reporter) -> Enum:
     path: Path = ("enums", name)
     if spec.type == "text":
         return _worded(name, spec, path, report)
+    if spec.ignore_case:
+        what = f"{name} has numbers, not words"
+        report.error("not-applicable", (*path, "ignore_case"), what, "remove ignore_case", of_key=True)
     bits, signed = _carrier(spec.type, path, report, signed=True)
     members = {}
     for key, value in spec.values.items():
@@ -67,6 +70,10 @@ def build_enum(name: str, spec: EnumSpec, report: Reporter) -> Enum:
 def _worded(name: str, spec: EnumSpec, path: Path, report: Reporter) -> Enum:
     """An enum of words; their places are its numbers."""
     words: dict[str, str] = {}
+
+    def same(one: str, other: str) -> bool:
+        return one.upper() == other.upper() if spec.ignore_case else one == other
+
     for key, value in spec.values.items():
         word, place = value.value, (*path, "values", key)
         if not isinstance(word, str):
@@ -76,7 +83,7 @@ def _worded(name: str, spec: EnumSpec, path: Path, report: Reporter) -> Enum:
             what = f"{shown(word)} is not a word of 1 to {MAX_CHARACTERS} printable ASCII characters"
             report.error("value-does-not-fit", place, what, "use other characters", needs=(place,))
             report.taint(path)
-        elif other := next((other for other, known in words.items() if known == word), None):
+        elif other := next((other for other, known in words.items() if same(known, word)), None):
             what = f"{key} and {other} are both {shown(word)}"
             report.error("duplicate-value", place, what, "give each a different word", needs=(place,))
         else:
@@ -85,7 +92,7 @@ def _worded(name: str, spec: EnumSpec, path: Path, report: Reporter) -> Enum:
         what = f"{name} has {len(spec.values)} words"
         report.error("value-does-not-fit", (*path, "values"), what, f"use at most {_MAX_WORDS}", needs=())
     members = tuple(NamedValue(key, at, spec.values[key].doc) for at, key in enumerate(words))
-    found = Words(name, tuple(each.encode() for each in words.values()) or (b"?",))
+    found = Words(name, tuple(each.encode() for each in words.values()) or (b"?",), spec.ignore_case)
     return Enum(name, _WORD_BITS, members, spec.doc, spec.section, found)
 
 

@@ -56,6 +56,7 @@ class EnumSpec(Fact):
     values: dict[str, Annotated[EnumValueSpec, ShortForm("value", "integer", "string")]] = Field(
         min_length=1, description="Name: number, or name: word"
     )
+    ignore_case: StrictBool = Field(default=False, description="Words are received in any case")
 
 
 class FlagSpec(Lifetime):

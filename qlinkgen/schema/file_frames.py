@@ -169,6 +169,9 @@ class PartSpec(Fact):
     range: AnyRange | None = Field(default=None, description="Legal values, in the unit")
     raw_range: AnyRange | None = Field(default=None, description="Legal values, as integers on the wire")
     default: ScalarValue | None = Field(default=None, description="Default of a value, in the unit")
+    ignore_case: StrictBool = Field(
+        default=False, description="A message id of several lengths is received in any case"
+    )
     shared: StrictBool = Field(default=False, description="A terminator that may begin the next frame too")
     time: Time | None = Field(
         default=None, description="Silence on the line that ends a frame, or break that begins one"

@@ -163,6 +163,8 @@ class FrameBuilder:
                 for name, part in specs.items()
             )
         )
+        if opening:
+            self._parts.check_opening(given[opening], (*path, opening))
         parts = with_text_id(parts, opening, given.get(opening))
         parts = PartConditions(specs, path, self._report).added(parts)
         stuffed = spec.stuffing if isinstance(spec, FrameSpec) else None

@@ -89,6 +89,7 @@ _KEYS = (
     "only",
     "words",
     "rejected",
+    "ignore_case",
     *_VALUE_KEYS,
 )
 
@@ -257,6 +258,11 @@ class PartBuilder:
     def fault(self, rule: str, path: Path, what: str, hint: str) -> None:
         """Report an error in a part, or in one of its keys."""
         self._report.error(rule, path, what, hint, of_key=True)
+
+    def check_opening(self, spec: PartSpec, path: Path) -> None:
+        """Report keys that do not apply to a message id of several lengths."""
+        known = ("type", "ignore_case")
+        self.reject(spec, [key for key in _KEYS if key not in known], "message id of several lengths", path)
 
     def reject(self, spec: PartSpec, keys: Iterable[str], role: str, path: Path) -> None:
         """Report keys that do not apply to a part with this role."""

@@ -14,7 +14,7 @@ from qlinkgen.model.fields import Field
 from qlinkgen.model.frame import ATTRIBUTE, DelimitedFrame, Frame, Opening, Part
 from qlinkgen.model.message import Message
 from qlinkgen.model.types import Constant, Scalar
-from qlinkgen.model.words import Words
+from qlinkgen.model.words import Words, cased
 from qlinkgen.schema.file_frames import Codings, PartSpec
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter
@@ -123,7 +123,7 @@ def with_text_id(parts: Sequence[Part], name: str, spec: PartSpec | None) -> tup
     if bounds is None:
         return tuple(parts)
     least, most = bounds
-    opening = Opening(name, least, most)
+    opening = Opening(name, least, most, folded=bool(spec and spec.ignore_case))
     return tuple(
         replace(part, opening=opening, min_size=part.min_size + least, max_size=part.max_size + most)
         if part.role == "payload"
@@ -156,10 +156,13 @@ class TextIds:
             self._report.error("id-does-not-fit", path, what, hint, needs=(path, ("frame",)))
             self._texts.append("?" * most)
             return len(self._texts) - 1
-        text = str(given)
-        if text not in self._texts:
-            self._texts.append(text)
-        return self._texts.index(text)
+        text, known = str(given), self._texts
+        if self._opening.folded:
+            text, known = text.upper(), [each.upper() for each in self._texts]
+        if text not in known:
+            self._texts.append(str(given))
+            return len(self._texts) - 1
+        return known.index(text)
 
     def text(self, number: int) -> bytes:
         """The id with a number."""
@@ -173,11 +176,12 @@ class Opener:
         """``frame`` is None if it could not be built."""
         payload = frame.payload if isinstance(frame, DelimitedFrame) else None
         self.name = payload.opening.name if payload and payload.opening else ""
+        self._folded = bool(payload and payload.opening and payload.opening.folded)
         self._report = report
 
     def opened(self, message: Message, text: bytes, path: Path) -> Message:
         """A message whose payload begins with its id; ``path`` is that of its fields."""
-        message = replace(message, text=text)
+        message = replace(message, text=text, folded=self._folded)
         if message.empty_is_default:
             what = f"an empty {message.name} has no {self.name}"
             place, needs = (*path[:-1], "empty_request"), (path, ("frame",))
@@ -193,7 +197,7 @@ class Opener:
         while name in taken:
             name += "_"
         # No enum is called so.
-        words = Words(f"{message.id}_{self.name}", (text,))
+        words = Words(f"{message.id}_{self.name}", (text,), self._folded)
         constant = Scalar(bits=_WORD_BITS, chunks=(), text=words, minimum=0, maximum=0, role=Constant())
         field = Field(name, constant, "Message id")
         return replace(message, fields=(field, *message.fields), leading=False)
@@ -201,7 +205,9 @@ class Opener:
 
 def check_text_ids(messages: Sequence[Message], places: Mapping[str, Path], report: Reporter) -> None:
     """Check that no id and payload can be taken for a longer id; ``places`` state the id of each message."""
-    known = [(each, each.text) for each in messages if each.text is not None]
+    known = [
+        (each, each.text.upper() if each.folded else each.text) for each in messages if each.text is not None
+    ]
     for one, text in known:
         for other, longer in known:
             apart = {one.direction, other.direction} == {"request", "response"}
@@ -221,10 +227,10 @@ def _may_begin(message: Message, rest: bytes) -> bool:
         return False
     fields = message.fields[bool(message.text) :]
     if message.separator and message.text:
-        return message.separator == rest[:1]
+        return message.separator in cased((rest[:1],), folded=message.folded)
     first: set[int] = {*message.separator} if message.separator else set()
     for field in fields:
         first |= bytes_in(field)
         if field.min_size:
             break
-    return rest[0] in first
+    return not first.isdisjoint(b"".join(cased((rest[:1],), folded=message.folded)))

@@ -17,10 +17,10 @@ _METER = """\
 qlinkgen: 1
 protocol: {name: meter, title: A voltmeter, revision: "1999.0", source: SCPI-99, doc: Commands and queries}
 enums:
-  mode: {type: text, values: {voltage: VOLT, current: CURR}}
+  mode: {type: text, ignore_case: true, values: {voltage: VOLT, current: CURR}}
 frame:
   parts:
-    command: {role: message, type: "text[0..16]"}
+    command: {role: message, type: "text[0..16]", ignore_case: true}
     data: {role: payload, size: 0..60}
     end: {role: terminator, value: 0A}
 bus: {kind: master_slave, response_within: 100 ms}
@@ -36,7 +36,12 @@ commands:
     id: "MEAS:VOLT:AC?"
     request: {channel: {type: u8, as: decimal, optional: true}}
     response: {value: {type: i32, as: "decimal[9]", scale: 1/1000}, mode: mode}
-  configure: {id: CONF, request: {mode: mode, range: {type: u16, as: decimal}}, response: none}
+  configure:
+    id: CONF
+    request: {mode: mode, range: {type: u16, as: decimal}}
+    response: none
+    examples:
+      - {wire: 43 6F 6E 66 20 63 75 52 72 20 37 0A, decode_only: true, request: {mode: current, range: 7}}
   label:
     id: DISP:TEXT
     separator: none

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from qlinkgen.backends.c.names import unsigned
+from qlinkgen.backends.c.words import octets_are
 from qlinkgen.plan.text_ids import TextIds
 from qlinkgen.plan.tree import Plan
 
@@ -45,8 +45,7 @@ def _found(texts: TextIds | None) -> Iterator[str]:
         if not text:
             yield f"    return {number}U;"
             continue
-        octets = (unsigned(octet, 8, hexadecimal=True) for octet in text)
-        *terms, last = (f"(payload[{index}] == {octet})" for index, octet in enumerate(octets))
+        *terms, last = octets_are("payload", text, folded=texts is not None and texts.folded)
         yield f"    if ((size >= {len(text)}U) &&"
         yield from (f"        {term} &&" for term in terms)
         yield f"        {last}) {{"

@@ -55,7 +55,7 @@ def _get(prefix: str, words: Words) -> Iterator[str]:
     yield f"static inline uint8_t {prefix}_get_word_{words.enum}_(const uint8_t *from, size_t size)"
     yield "{"
     for number, word in enumerate(words.words):
-        *terms, last = (f"(from[{index}] == {_octet(octet)})" for index, octet in enumerate(word))
+        *terms, last = octets_are("from", word, folded=words.folded)
         yield f"    if ((size == {len(word)}U) &&"
         yield from (f"        {term} &&" for term in terms)
         yield f"        {last}) {{"
@@ -67,3 +67,13 @@ def _get(prefix: str, words: Words) -> Iterator[str]:
 
 def _octet(octet: int) -> str:
     return unsigned(octet, 8, hexadecimal=True)
+
+
+def octets_are(source: str, word: bytes, *, folded: bool) -> list[str]:
+    """The conditions that hold if bytes are those of a word, of any case if it is ``folded``."""
+    return [
+        f"(({source}[{index}] & 0xDFU) == {_octet(octet & 0xDF)})"
+        if folded and chr(octet).isalpha()
+        else f"({source}[{index}] == {_octet(octet)})"
+        for index, octet in enumerate(word)
+    ]

@@ -418,12 +418,15 @@ class Message(Construct):
         seeds: Sequence[tuple[str, bytes]] = (),
         settled: Sequence[tuple[str, int]] = (),
         text: bytes | None = None,
+        folded: bool = False,
     ) -> None:
         super().__init__()
         self.name = name
         self.id = message_id
         #: The id that its payload begins with, None if parts of its frame hold the id.
         self.text = text
+        #: Letters of either case are parsed in it.
+        self.folded = folded
         #: Values of its frame that are always the same.
         self.settled = dict(settled)
         self.fields = fields

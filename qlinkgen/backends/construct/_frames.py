@@ -699,8 +699,12 @@ class Frame(Construct):
 
     def _begun(self, payload: bytes) -> int:
         """The number of the longest id that a payload begins with, -1 if it has none."""
-        begun = [text for text in self.texts if payload.startswith(text)]
-        return self.texts[max(begun, key=len)] if begun else -1
+        texts = self.texts
+        if any(each.folded for each in self.by_id.values()):
+            payload = payload.upper()
+            texts = {text.upper(): number for text, number in texts.items()}
+        begun = [text for text in texts if payload.startswith(text)]
+        return texts[max(begun, key=len)] if begun else -1
 
     def _compare_blocks(self, cells: Mapping[str, bytes], payload: bytes) -> None:
         for blocks in self.parts:

@@ -137,9 +137,11 @@ class Word(Construct):
     One of variable size is all bytes, which the Message limits.
     """
 
-    def __init__(self, *words: bytes) -> None:
+    def __init__(self, *words: bytes, folded: bool = False) -> None:
         super().__init__()
         self.words = words
+        # Letters of either case are parsed.
+        self.folded = folded
         self.minimum = min(map(len, words))
         self.maximum = max(map(len, words))
 
@@ -148,9 +150,12 @@ class Word(Construct):
             text = stream_read(stream, self.maximum, path)
         else:
             text = stream_read_entire(stream, path)
-        if text not in self.words:
+        words = self.words
+        if self.folded:
+            words, text = tuple(each.upper() for each in words), text.upper()
+        if text not in words:
             raise ValidationError(f"{text!r} is not one of the words", path=path)
-        return self.words.index(text)
+        return words.index(text)
 
     def _build(
         self, obj: object, stream: BinaryIO, context: Container, path: str

@@ -126,6 +126,8 @@ def _stated(message: Message) -> dict[str, Node]:
         settings["settled"] = message.settled
     if message.text is not None:
         settings["text"] = message.text
+    if message.folded:
+        settings["folded"] = True
     return settings
 
 

@@ -54,7 +54,7 @@ def integer(kind: Integer, *, signed: bool | None = None) -> Node:
     """The construct of an integer, Groups if construct does not provide one."""
     signed = kind.signed if signed is None else signed
     if isinstance(kind.text, Words):
-        return Call("Word", kind.text.words)
+        return _words(kind.text)
     if isinstance(kind.text, Scientific):
         return Call("TextReal", (kind.bits,))
     if text := kind.text:
@@ -72,6 +72,10 @@ def integer(kind: Integer, *, signed: bool | None = None) -> Node:
         return Ref(f"Int{kind.bits}{'s' if signed else 'u'}{kind.byteorder[0]}")
     flags = {"signed": signed, "swapped": kind.byteorder == "little"}
     return Call("BytesInteger", (kind.size,), tuple((key, True) for key, value in flags.items() if value))
+
+
+def _words(words: Words) -> Call:
+    return Call("Word", words.words, (("folded", True),) if words.folded else ())
 
 
 def _raw(number: Scalar, kind: Integer) -> Node:
@@ -154,7 +158,7 @@ class Types:
         size = (group.bits + 7) // 8
         plain = integer(Integer(8 * size, signed=False, chunks=byte_chunks(size, "big")))
         words = group.words if isinstance(group, Enum) else None
-        carrier = self._usual.get(group.name, Call("Word", words.words) if words else plain)
+        carrier = self._usual.get(group.name, _words(words) if words else plain)
         if any(keyword.iskeyword(name) or name in ("self", "subcon") for name, _ in members):
             node = Call(kind, (carrier, Sequence(tuple(Call("Member", each) for each in members))))
         else:

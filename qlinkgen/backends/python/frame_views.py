@@ -257,6 +257,8 @@ class PartsView:
     kind: OfKind | None = None
     #: The tables of ids that payloads begin with, [] if parts hold ids.
     texts: Sequence[str] = ()
+    #: Letters of either case are received in them.
+    folded: bool = False
 
     template = "delimited"
 

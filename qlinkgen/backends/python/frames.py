@@ -255,6 +255,7 @@ def _parts(plan: Plan, title: str, *, bare: bool, verified: bool) -> PartsView:
         tail_tests=[test for part in envelope.back for test in pieces.tail_tests(envelope, part)],
         before=before_view(envelope),
         texts=_texts(plan),
+        folded=any(each.folded for each in map(plan.texts, plan.received_directions) if each),
     )
 
 

@@ -107,6 +107,7 @@ def number_in(integer: Integer, text: str) -> str:
     """The number of a text, or one above the maximum of the integer."""
     assert integer.text
     if isinstance(integer.text, Words):
+        text = f"{text}.upper()" if integer.text.folded else text
         return f"{numbers_of(integer.text)}.get({text}, {integer.maximum + 1})"
     assert not isinstance(integer.text, Scientific)  # floats, not integers, are read
     text = f'{text}.lstrip(b" ")' if integer.text.spaced else text

@@ -70,7 +70,8 @@ def word_tables(plan: Plan) -> list[str]:
     for words in (*found, *plan.id_words):
         written = list(map(literal, words.words))
         lines += listing(f"{words_of(words)} = (", written, ")", 0)
-        pairs = [f"{word}: {number}" for number, word in enumerate(written)]
+        received = [literal(each.upper()) for each in words.words] if words.folded else written
+        pairs = [f"{word}: {number}" for number, word in enumerate(received)]
         lines += wrapped(f"{numbers_of(words)} = {{", pairs, "}", 0)
     return lines
 

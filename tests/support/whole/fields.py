@@ -358,6 +358,9 @@ class FieldMaker:
             for _ in range(rng.choice((1, 2, 3, 8)))
         }
         listed = rng.sample(sorted(words), len(words))
+        if len({word.upper() for word in words}) == len(words) and random.Random(repr(listed)).random() < 0.4:
+            named = {self.words.name(names): word for word in listed}
+            return {"type": "text", "ignore_case": True, "values": named}
         return {"type": "text", "values": {self.words.name(names): word for word in listed}}
 
     def _word(self, kinds: list[str]) -> tuple[Any, int]:

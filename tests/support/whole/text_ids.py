@@ -35,7 +35,8 @@ def draw(rng: random.Random, document: Doc) -> None:
             spec["id"] = texts.of(name, spec["id"])
     used = [*texts.given.values(), *([""] if common.get("id") == "" else [])] or ["S"]
     least, most = min(map(len, used)), max(map(len, used))
-    kind = {"role": "message", "type": f"text[{least if least < most else least - 1}..{most}]"}
+    kind: Doc = {"role": "message", "type": f"text[{least if least < most else least - 1}..{most}]"}
+    kind |= {"ignore_case": True} if rng.random() < 0.3 else {}
     moved: Doc = {}
     for each, spec in parts.items():
         if each == data:

@@ -299,7 +299,8 @@ class Fields:
             given = [each["value"] if isinstance(each, dict) else each for each in enum["values"].values()]
             words = tuple(each.encode() for each in given)
             pieces = ((0, 8),) * max(map(len, words))
-            return Number(8, signed=False, pieces=pieces, low=0, high=len(words) - 1, words=words)
+            any_case = enum.get("ignore_case", False)
+            return Number(8, False, pieces, 0, len(words) - 1, words=words, any_case=any_case)
         bits, signed, scale, truth, forbidden = self._carrier(base)
         bits = 1 if truth and "packed" in spec else bits
         pieces = () if "packed" in spec else self._pieces(bits, spec)

@@ -226,6 +226,7 @@ class Frame:
         self.seeds: dict[int, Mapping[str, bytes]] = {}
         #: Ids that payloads begin with, by their number.
         self.texts: dict[bytes, int] = {}
+        self.any_case = bool(frame.get("any_case"))
         self.checks = [part for part in self.parts if part.role == "checksum"]
         self.blocks: Part | None = next((part for part in self.parts if part.role == "blocks"), None)
         self.payload_at = self.parts.index(self.by_role["payload"])
@@ -601,7 +602,9 @@ class Frame:
             return self.step * get(part.pieces, cut[part.name]) if part and part.name in cut else None
         if role == "message" and self.texts:
             payload = self.by_role["payload"].name
-            return text_ids.longest(self.texts, cut[payload]) if payload in cut else None
+            if payload not in cut:
+                return None
+            return text_ids.longest(self.texts, cut[payload], any_case=self.any_case)
         found = (
             self.id_bits()
             if role == "message"

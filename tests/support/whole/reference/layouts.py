@@ -39,6 +39,8 @@ class Number:
     spaced: bool = False
     #: Of an enum that is sent as text: its words, whose places are the numbers.
     words: tuple[bytes, ...] = ()
+    #: They are received in any case.
+    any_case: bool = False
     #: The integer is the bits of a floating-point number, perhaps with bounds.
     real: bool = False
     bounds: tuple[float, float] | None = None

@@ -21,6 +21,7 @@ def opened(document: Doc) -> None:
         return
     low, high = whole_span(specs[name]["type"][5:-1])
     frame["opening"], frame["texts"] = name, []
+    frame["any_case"] = specs[name].get("ignore_case", False)
     for each, spec in specs.items():
         if spec["role"] == "payload":
             least, most = whole_span(spec["size"])
@@ -56,7 +57,8 @@ def begun(document: Doc, message: Message) -> Message:
     taken = {slot.name for slot in message.slots}
     while name in taken:
         name += "_"
-    number = Number(8, signed=False, pieces=((0, 8),) * len(text), low=0, high=0, words=(text,))
+    pieces, any_case = ((0, 8),) * len(text), frame["any_case"]
+    number = Number(8, False, pieces, 0, 0, words=(text,), any_case=any_case)
     slot = Slot(name, number, "constant")
     return replace(message, slots=(slot, *message.slots), leading=False)
 
@@ -67,7 +69,11 @@ def texts_of(document: Doc, messages: Iterable[Message]) -> dict[bytes, int]:
     return {texts[each.number].encode(): each.number for each in messages} if texts else {}
 
 
-def longest(texts: dict[bytes, int], payload: bytes) -> int:
+def longest(texts: dict[bytes, int], payload: bytes, *, any_case: bool) -> int:
     """The number of the longest id that a payload begins with, -1 if it has none."""
-    sizes = [len(text) for text in texts if payload[: len(text)] == text]
-    return texts[payload[: max(sizes)]] if sizes else -1
+    begun = [
+        text
+        for text in texts
+        if payload.startswith(text) or (any_case and payload.lower().startswith(text.lower()))
+    ]
+    return texts[max(begun, key=len)] if begun else -1

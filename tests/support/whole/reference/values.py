@@ -314,9 +314,10 @@ def _put(number: Number, raw: int) -> bytes:
 def _get(number: Number, data: bytes) -> int:
     """The integer of wire bytes. Raises Wrong for a wrong digit, or another word."""
     if number.words:
-        if data not in number.words:
-            raise Wrong("range", str(data))
-        return number.words.index(data)
+        for place, word in enumerate(number.words):
+            if data == word or (number.any_case and data.lower() == word.lower()):
+                return place
+        raise Wrong("range", str(data))
     if number.scientific:
         return real_of(number, data)
     if number.text:
