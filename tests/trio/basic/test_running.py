@@ -134,6 +134,7 @@ add: VR(0)=VR(0)+i
     ("text", "error"),
     [
         ("VR(251)=1", "1:1: VR(251): a Motion Coordinator has the variables VR(0) to VR(250)"),
+        ("VR(1e300)=1", "1:4: 1e+300 was given; give a whole number"),
         ("a=VR(1.5)", "1:6: 1.5 was given; give a whole number"),
         ("a=1:a=a/(a-1)", "1:8: 1 is divided by 0; test the divisor first"),
         ("a=1e300\na=a*a", "2:4: the number is too large; keep it below 1e308"),

@@ -51,10 +51,10 @@ def whole(expression: Expression, scope: Scope) -> int:
     """Return the value of an expression that has to be a whole number.
 
     Raises:
-        BasicError: it has decimals.
+        BasicError: it has decimals, or is so large that it has none by chance.
     """
     value = expression.value(scope)
-    if value != int(value):
+    if value != int(value) or abs(value) > _MOST_BITS:
         raise expression.place.error(f"{value:g} was given; give a whole number")
     return int(value)
 
