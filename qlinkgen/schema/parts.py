@@ -60,6 +60,18 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "idle": ("time", "at_least", "alone"),
     "break": ("time", "at_least", "alone"),
 }
+#: Roles of parts that are numbers, beside check values.
+_NUMBERS = (
+    "length",
+    "message",
+    "address",
+    "destination",
+    "source",
+    "direction",
+    "value",
+    "counter",
+    "derived",
+)
 _KEYS = (
     "type",
     "byteorder",
@@ -267,10 +279,17 @@ class PartBuilder:
     def reject(self, spec: PartSpec, keys: Iterable[str], role: str, path: Path) -> None:
         """Report keys that do not apply to a part with this role."""
         for key in keys:
-            if {"as": "as_"}.get(key, key) in spec.model_fields_set:
-                self.fault(
-                    "not-applicable", (*path, key), f"'{key}' has no effect on a {role} here", "remove it"
-                )
+            if {"as": "as_"}.get(key, key) not in spec.model_fields_set:
+                continue
+            article = "an" if role[0] in "aeiou" else "a"
+            if key == "as" and role in _NUMBERS:
+                what = f"{path[-1]} is {article} {role}, and only check values of a frame are sent as digits"
+                hint = "describe it as text with as many characters, type: text[N]"
+                self.fault("bad-digits", (*path, key), what, hint)
+                self._report.taint((*path, key))
+                continue
+            what = f"'{key}' has no effect on {article} {role} here"
+            self.fault("not-applicable", (*path, key), what, "remove it")
 
     def _lacks(self, key: str, hint: str, path: Path) -> None:
         if not self._report.touched((*path, key)):

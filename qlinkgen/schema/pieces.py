@@ -75,7 +75,7 @@ class PieceBuilder:
                 number = self._number(name, 0, text, spec.doc, path)
                 return _container(text), (self._counted(number, spec, path),)
             case _:
-                if kind is not None:
+                if kind is not None and spec.as_ is None:
                     what = f"{shown(spec.type)} is not the type of a value of every frame"
                     hint = "use an integer, an enum, flags, bits, or text[1..8]"
                     self._fault("not-applicable", (*path, "type"), what, hint)
