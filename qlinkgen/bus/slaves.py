@@ -11,7 +11,6 @@ from typing import Literal, Self, Unpack
 from qlinkgen.bus.making import open_line
 from qlinkgen.bus.options import Parity, SlaveOptions, StopBits
 from qlinkgen.bus.watching import tell_frames, trace
-from qlinkgen.errors import PortLost
 from qlinkgen.link.codec import Codec
 from qlinkgen.link.events import Frame
 from qlinkgen.link.gaps import idle_of
@@ -132,25 +131,18 @@ class Slave:
         """Answer in a thread during a block.
 
         Raises:
-            PortLost: the port was lost meanwhile.
+            PortLost: the port was lost meanwhile. Errors of handlers are raised here, too.
         """
-        stopped, lost = threading.Event(), list[PortLost]()
+        from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415  # which other slaves do not need
 
-        def run() -> None:
+        stopped = threading.Event()
+        with ThreadPoolExecutor(1, "slave") as thread:
+            running = thread.submit(self.run, stopped.is_set)
             try:
-                self.run(stopped.is_set)
-            except PortLost as error:
-                lost.append(error)
-
-        thread = threading.Thread(target=run, name="slave", daemon=True)
-        thread.start()
-        try:
-            yield self
-        finally:
-            stopped.set()
-            thread.join()
-        if lost:
-            raise lost[0]
+                yield self
+            finally:
+                stopped.set()
+                running.result()
 
     def close(self) -> None:
         """Close the port."""

@@ -294,6 +294,18 @@ def test_a_slave_answers_in_an_event_loop() -> None:
     assert asyncio.run(run()) == [6]
 
 
+def test_an_error_of_a_handler_is_not_lost_with_its_thread() -> None:
+    class Broken(Registers):
+        def write_single_register(self, request: Any, now: float) -> Any:
+            raise KeyError(request.number)
+
+    near, far = memory_pair()
+    slave = modbus.Slave(far, Broken())
+    with pytest.raises(KeyError, match="7") as caught, slave.running(), modbus.Bus(near, attempts=1) as bus:
+        bus.write_single_register(NODE, number=7, value=1)
+    assert isinstance(caught.value.__context__, NoReply)
+
+
 def test_a_port_that_is_lost_ends_a_running_slave() -> None:
     near, far = memory_pair()
     with pytest.raises(PortLost), modbus.Slave(far, Registers()).running():
