@@ -117,9 +117,8 @@ def test_what_is_not_a_regular_file(qlinkgen: Run, tmp_path: Path, command: str,
             path.mkdir()
         else:
             path.symlink_to("/dev/null" if kind == "device" else "/dev/zero")
-        before, rest = {"send": (["/dev/null"], ["x"])}.get(command, ([], []))
-        rest = {"encode": ["x"], "decode": ["00"], "explain": ["00"]}.get(command, rest)
-        result = qlinkgen(command, *before, path, *rest)
+        rest = {"encode": ["x"], "decode": ["00"], "explain": ["00"], "send": ["/dev/null", "x"]}
+        result = qlinkgen(command, path, *rest.get(command, []))
     assert result.code == 2
     said = result.out + result.err
     if command == "lint" and kind == "folder":
