@@ -31,10 +31,9 @@ def nested(node: BaseModel) -> Iterator[tuple[str, str, object]]:
 
     Most attributes hold a single value or nothing, so a walk through a file passes over them here.
     """
-    fields = type(node).model_fields
     for name, value in node.__dict__.items():
         if type(value) not in _SINGLE and isinstance(value, BaseModel | dict | list):
-            yield name, fields[name].alias or name, value
+            yield name, type(node).model_fields[name].alias or name, value
 
 
 class Fact(FileMapping):
