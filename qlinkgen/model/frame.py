@@ -116,7 +116,7 @@ class PartBits:
     shift: int
     bits: int
     at: int = 0
-    #: Legal values of a constant, the first of which is sent; ids or addresses that frames begin with.
+    #: Legal values of a constant, the first of which is sent.
     constants: tuple[int, ...] = ()
     #: The value for each direction.
     directions: Mapping[str, int] = field(default_factory=dict)
@@ -187,6 +187,8 @@ class Part:
     #: What its bits hold: all of a message id or address, those described of a part with role "bits", whose
     #: others are sent as 0 and ignored when received.
     bits: tuple[PartBits, ...] = ()
+    #: The numbers of the first part of a kind of frame that it tells, () for others.
+    numbers: tuple[int, ...] = ()
     derivation: Derivation | None = None
     #: Names of the parts that a length counts.
     counts: tuple[str, ...] = ()
@@ -347,19 +349,20 @@ class DelimitedFrame:
         return len(self.parts) == 1 and self.parts[0].role == "payload"
 
     @property
-    def leading(self) -> PartBits | None:
-        """The message id or the address if a frame begins with all of it, else None."""
+    def leading(self) -> Part | None:
+        """The first part if the numbers in it tell a kind: a message id, an address, or bits of one byte."""
         first = self.parts[0]
         whole = first.role == "address" or (first.role == "message" and first.bits == self.id_bits)
-        return first.bits[0] if whole else None
+        told = first.size == 1 and any(each.is_id or each.role == "constant" for each in first.bits)
+        return first if first.scalar is not None and (whole or told) else None
 
     @property
     def starts(self) -> tuple[bytes, ...]:
-        """The bytes that frames begin with: a constant, or each id or address; () if any may."""
+        """The bytes that frames begin with: a constant, or each number of the first part; () if any may."""
         first = self.parts[0]
-        if self.leading is None or first.scalar is None:
+        if first.scalar is None:
             return (first.constant,) if first.constant else ()
-        return tuple(map(first.scalar.integer.pack, self.leading.constants))
+        return tuple(map(first.scalar.integer.pack, first.numbers))
 
     @property
     def complemented(self) -> bool:

@@ -645,7 +645,8 @@ def _after_text(way: FrameStuffing) -> str:
 def _start_text(kind: FramePlan) -> str:
     """What frames of a kind begin with, "" if any bytes."""
     first = kind.envelope.parts[0]
-    ids = "an address" if isinstance(first, AddressPart) else "the message ids"
+    told = "bits of the first byte" if isinstance(first, CellPart) else "the message ids"
+    ids = "an address" if isinstance(first, AddressPart) else told
     ids = ids if kind.envelope.starts else ""
     return kind.envelope.preamble.hex(" ").upper() or ids
 

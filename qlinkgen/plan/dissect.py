@@ -180,7 +180,7 @@ class _Walk:
                 if start < 0:
                     self._lost(first)
                     return tuple(others[: self.envelope.payload_at - 1])
-            case IdPart() | AddressPart() if first.numbers and self.kind == "frame":
+            case IdPart() | AddressPart() | CellPart() if first.numbers and self.kind == "frame":
                 found = [at for each in first.starts if (at := self.wire.find(each)) >= 0]
                 if not found:
                     self._fault("frame", Rule.BEGINNING, 0, first)

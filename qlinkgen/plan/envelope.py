@@ -21,6 +21,7 @@ from qlinkgen.plan.parts import (
     EqualPart,
     IdPart,
     IdSlot,
+    LeadingPart,
     LengthPart,
     Part,
     PayloadPart,
@@ -125,9 +126,9 @@ class Envelope:
 
     @cached_property
     def starts(self) -> tuple[bytes, ...]:
-        """The bytes that a frame may begin with: a constant, or each message id or address; () if any."""
+        """The bytes that a frame may begin with: a constant, or each number of the first part; () if any."""
         first = self.parts[0] if self.parts else None
-        return first.starts if isinstance(first, ConstantPart | IdPart | AddressPart) else ()
+        return first.starts if isinstance(first, ConstantPart | LeadingPart) else ()
 
     @property
     def length(self) -> LengthPart | None:

@@ -420,11 +420,11 @@ def _integer_part(frame: DelimitedFrame, part: StatedPart, transparency: Transpa
     assert part.scalar is not None
     integer = part.scalar.integer
     if part.role == "message" and part.bits == frame.id_bits:
-        return IdPart(part.name, integer, part.bits[0].constants)
+        return IdPart(part.name, integer, part.numbers)
     if part.role == "address":
-        return AddressPart(part.name, integer, part.bits[0].constants)
+        return AddressPart(part.name, integer, part.numbers)
     if part.bits:
-        return CellPart(part.name, integer, tuple(map(_slot, part.bits)))
+        return CellPart(part.name, integer, part.numbers, tuple(map(_slot, part.bits)))
     bias, payload = frame.length_bias, frame.payload
     most = min(integer.maximum, (bias + transparency.most_sent(payload.max_size)) // part.scale)
     least = -(-(bias + payload.min_size) // part.scale)

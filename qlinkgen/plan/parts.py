@@ -70,7 +70,7 @@ class LengthPart(_IntegerPart):
 
 
 @dataclass(frozen=True, slots=True)
-class _LeadingPart(_IntegerPart):
+class LeadingPart(_IntegerPart):
     """An integer that may be the first part: ``numbers`` are those that a kind of frame begins with.
 
     They are () if other parts tell a frame.
@@ -85,12 +85,12 @@ class _LeadingPart(_IntegerPart):
 
 
 @dataclass(frozen=True, slots=True)
-class IdPart(_LeadingPart):
+class IdPart(LeadingPart):
     """The number of the message."""
 
 
 @dataclass(frozen=True, slots=True)
-class AddressPart(_LeadingPart):
+class AddressPart(LeadingPart):
     """The address of the node: the recipient of a request, the sender of a response."""
 
 
@@ -250,10 +250,10 @@ def _fixed(slot: Slot, numbers: Mapping[str, int]) -> Slot:
 
 
 @dataclass(frozen=True, slots=True)
-class CellPart(_IntegerPart):
+class CellPart(LeadingPart):
     """An integer whose bits have several roles; bits without one are sent as 0 and ignored when received."""
 
-    slots: tuple[Slot, ...]
+    slots: tuple[Slot, ...] = ()
 
     @property
     def constants(self) -> tuple[ConstantSlot, ...]:

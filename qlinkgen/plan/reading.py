@@ -276,11 +276,7 @@ class FrameReader:
             case ConstantPart():
                 self._begin(cursor, part, part.starts, taken)
                 return 0
-            case IdPart() if part.numbers:
-                self._begin(cursor, part, part.starts, taken)
-                self._identify(taken)
-                return 0
-            case AddressPart() if part.numbers:
+            case IdPart() | AddressPart() | CellPart() if part.numbers:
                 self._begin(cursor, part, part.starts, taken)
                 return self._numeric(cursor, part, taken)
             case LengthPart() | IdPart() | AddressPart() | CellPart() | EqualPart():

@@ -18,8 +18,6 @@ from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
 _RULE = "bad-kinds"
-#: Bits of an address that frames may begin with: receivers know each of its numbers.
-_BYTE = 8
 #: Size up to which only answers may have a frame without a check value.
 _SHORT = 2
 
@@ -102,9 +100,7 @@ def begun(kinds: FrameKinds, messages: list[Message], report: Reporter) -> Frame
         if kind.own and not any(kind in kinds.carrying(each.id) for each in messages):
             continue
         if kind.frame.leading is not None:
-            numbers = _leading(kinds, kind, messages)
-            first = kind.frame.parts[0]
-            first = replace(first, bits=(replace(first.bits[0], constants=numbers),))
+            first = replace(kind.frame.leading, numbers=_leading(kinds, kind, messages))
             kind = replace(kind, frame=replace(kind.frame, parts=(first, *kind.frame.parts[1:])))  # noqa: PLW2901
         found.append(kind)
     checker = _Checker(report)
@@ -114,12 +110,28 @@ def begun(kinds: FrameKinds, messages: list[Message], report: Reporter) -> Frame
 
 
 def _leading(kinds: FrameKinds, kind: FrameKind, messages: list[Message]) -> tuple[int, ...]:
-    """The message ids, or the addresses, that the frames of a kind begin with."""
-    carried = [each for each in messages if kind in kinds.carrying(each.id)]
-    if kind.frame.parts[0].role == "message":
-        return tuple(sorted({each.id - kinds.base(kind.family) for each in carried}))
-    ranges = {each for message in carried for each in message.addresses}
-    return tuple(sorted({number for first, last in ranges for number in range(first, last + 1)}))
+    """The numbers that the first part of a kind may have: ids, addresses, or those of its bits."""
+    first, base = kind.frame.parts[0], kinds.base(kind.family)
+    carried = {(each.id - base, each.addresses) for each in messages if kind in kinds.carrying(each.id)}
+    if first.bits == kind.frame.id_bits:
+        return tuple(sorted({number for number, _ in carried}))
+    if first.size > 1 or first.scalar is None:
+        return ()
+    numbers = range(first.scalar.integer.mask + 1)
+    return tuple(each for each in numbers if any(_begins(first.bits, each, *one) for one in carried))
+
+
+def _begins(bits: tuple[PartBits, ...], byte: int, number: int, addresses: Sequence[tuple[int, int]]) -> bool:
+    """Whether the first byte of the frame of a message, with its id and addresses, may be this one."""
+    for each in bits:
+        value = (byte & each.mask) >> each.shift
+        if each.is_id and value != number >> each.at & (1 << each.bits) - 1:
+            return False
+        if each.role == "constant" and value not in each.constants:
+            return False
+        if each.role == "address" and not any(first <= value <= last for first, last in addresses):
+            return False
+    return True
 
 
 def _built(
@@ -217,16 +229,18 @@ class _Checker:
         path: Path = ("frames", name, "parts")
         first = frame.parts[0].name
         if frame.leading is not None:
-            if frame.parts[0].role == "address" and frame.leading.bits > _BYTE:
-                what = f"{name} begins with {first} of {frame.leading.bits} bits, one of too many numbers"
+            if frame.leading.role == "address" and frame.leading.size > 1:
+                bits = frame.leading.bits[0].bits
+                what = f"{name} begins with {first} of {bits} bits, one of too many numbers"
                 self._error((*path, first), what, "begin it with a constant, or an address of one byte")
             if frame.part("terminator"):
-                what = f"{name} begins with its {frame.parts[0].role.replace('message', 'message id')}"
-                what += " and ends with a terminator"
+                told = {"message": "its message id", "address": "its address"}
+                what = f"{name} begins with {told.get(frame.leading.role, first)} and ends with a terminator"
                 self._error((*path, first), what, "begin it with a constant, or give it a length")
         elif not frame.preamble and not frame.is_payload:
             what = f"{name} begins with {first}, not with constant bytes"
-            hint = "begin it with a constant that tells it from other kinds, its message id or its address"
+            hint = "begin it with a constant that tells it from other kinds, with its message id or address, "
+            hint += "or with a byte of which constants or a piece of the id tell it"
             self._error((*path, first), what, hint)
         if frame.idle:
             what = (
@@ -261,7 +275,8 @@ class _Checker:
                     first, second = (each.hex(" ").upper() for each in same)
                     what = f"{kind.name} begins with {first}, {other.name} with {second}"
                     led = {each.role for each in (kind.frame.leading, other.frame.leading) if each}
-                    others = ["constants", *sorted({"message": "ids"}.get(each, "addresses") for each in led)]
+                    words = {"message": "ids", "address": "addresses", "bits": "bits"}
+                    others = ["constants", *sorted(words[each] for each in led)]
                     hint = f"a receiver cannot tell them apart; use other {' or '.join(others)}"
                     self._error(("frames", kind.name), what, hint)
 

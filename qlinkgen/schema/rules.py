@@ -228,7 +228,7 @@ _ALL = (
     ),
     Rule(
         "bad-kinds",
-        "Constants or message ids at their beginning tell kinds of frame apart; each message knows its kind.",
+        "The first bytes of kinds of frame tell them apart; each message knows its kind.",
         "A receiver tries each kind of its direction where one may begin. A kind with if: {direction: "
         "request} has no answers, and may begin like one of the other direction; one with parts of one "
         "direction has no messages without a direction. Kinds have no idle line, trim or blocks, do not "

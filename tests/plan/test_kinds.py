@@ -433,3 +433,49 @@ def test_values_of_the_header_decide_about_parts_of_a_kind() -> None:
     assert (heard[2].hops, heard[2].stamp, heard[4].hops, heard[4].stamp) == (3, 0, 7, 0x102)
     with pytest.raises(generated.EncodeError):
         generated.encode(generated.Note(text=b"", stamp=1))
+
+
+BITS = """
+qlinkgen: 1
+protocol: {name: told_by_bits, revision: "1", source: Made up}
+byteorder: big
+frames:
+  level:
+    parts:
+      head: {type: u8, bits: {tenths: 0..5, mark: {at: 6..7, const: 2}}}
+      sum: {type: u8, algorithm: sum8-inverted, over: [head]}
+  data:
+    parts:
+      head: {type: u8, bits: {code: {at: 0..3, role: message}, spare: {at: 4..5, const: [0, 1]}, mark: {at: 6..7, const: 3}}}
+      length: {type: u8, counts: data}
+      data: {role: payload, size: 0..20}
+      crc: {type: u8, algorithm: crc-8/smbus, over: [head, length, data]}
+bus: {kind: host}
+defaults: {repeat: safe}
+commands: {}
+messages:
+  level: {frame: level, direction: response, fields: {}}
+  note: {frame: data, id: 5, direction: response, fields: {text: bytes}}
+"""  # noqa: E501
+
+
+def test_bits_of_the_first_byte_tell_kinds() -> None:
+    protocol, faults = loads(BITS, "bits.yaml")
+    assert protocol is not None, faults
+    plan, generated = plan_of(protocol), load_codec(protocol)
+    codec = Codec(plan)
+    starts = {each.name: set(b"".join(each.envelope.starts)) for each in plan.frame.kinds}
+    assert starts == {"level": set(range(0x80, 0xC0)), "data": {0xC5, 0xD5}}
+    level, note = codec.encode("level", {"tenths": 0x25}), codec.encode("note", {"text": b"\xc5\x80"})
+    assert (level, note[:2]) == (bytes.fromhex("A5 5A"), bytes.fromhex("C5 02"))
+    # An unknown id, and spare bits that no frame has, begin none.
+    stream = b"\xc6\xe5" + note[:3] + level + b"\xff" + note + level
+    found = [event.decoded.message.name if event.decoded else event.kind
+             for event in receiver(plan, "response").run(stream)]  # fmt: skip
+    decoder = generated.StreamDecoder("response")
+    heard = [event for byte in stream for event in decoder.feed(bytes((byte,)))] + decoder.finish()
+    assert [getattr(each, "NAME", "") or each.kind for each in heard] == found
+    assert [each for each in found if each in plan.by_name] == ["level", "note", "level"]
+    with pytest.raises(generated.DecodeError) as refused:
+        generated.decode_response(b"\xe5" + note[1:])
+    assert refused.value.kind == dissect(plan, b"\xe5" + note[1:], "response").kind == "frame"

@@ -184,7 +184,7 @@ class PartWriter(CheckWriter):
                     yield f"if ({reached}{end}U) {{"
                     yield from (f"    {line}" for line in self._announced(part, all_there=all_there))
                     yield "}"
-                case IdPart() | AddressPart() if part.numbers:
+                case IdPart() | AddressPart() | CellPart() if part.numbers:
                     test = f"!{self.own}_begins_(body, {counted})"
                     test = test if all_there else f"({counted} <= {end}U) && {test}"
                     yield from refusal(test, f"{self.prefix.upper()}_ERROR_FRAME")

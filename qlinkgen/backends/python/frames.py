@@ -46,6 +46,7 @@ from qlinkgen.plan.parts import (
     ConstantPart,
     EqualPart,
     IdPart,
+    LeadingPart,
     LengthPart,
     MarkPart,
     Numeric,
@@ -487,7 +488,7 @@ def _head_checks(frame: FramePlan, envelope: Envelope, *, bare: bool) -> Iterato
 
 def _number_checks(envelope: Envelope, part: Numeric, *, bare: bool) -> Iterator[HeadCheck]:
     no_frame, end = '"no_frame", start, b""', envelope.offset(part) + part.size
-    if isinstance(part, IdPart | AddressPart) and part.numbers:
+    if isinstance(part, LeadingPart) and part.numbers:
         yield HeadCheck(f"head[:{end}] not in _BEGUN", no_frame, "constant")
     tests = (pieces.wrong(envelope, part, *source) for source in (("head",), pieces.BUFFER))
     for test, whole in zip(*tests, strict=True):

@@ -141,17 +141,40 @@ def lead_with_addresses(rng: random.Random, several: Kinds, bus: Doc) -> None:
         begun = {first for name in several.frames if name != family.name for first in _begun(several, name)}
         if not starts.isdisjoint(begun):
             continue
-        rest = {name: spec for name, spec in parts.items() if name not in ("start", "node")}
-        for spec in (each for each in rest.values() if isinstance(each, dict)):
-            for key in ("over", "counts"):
-                if isinstance(spec.get(key), list):
-                    seeds = [name for name in spec[key] if name.startswith("attribute.")]
-                    kept = [name for name in ("node", *rest) if name in spec[key]]
-                    spec[key] = kept + seeds or ["node"]
-        node = parts["node"]
-        parts.clear()
-        parts |= {"node": node, **rest}
+        _lead(parts, "node")
         return
+
+
+def lead_with_bits(rng: random.Random, several: Kinds) -> None:
+    """Let one kind begin with a byte whose constant and piece of the id tell it, if no other then can."""
+    firsts = [next(iter(each["parts"].values())) for each in several.frames.values()]
+    if any(isinstance(each, dict) and each["role"] == "address" for each in firsts):
+        return
+    for family in several.families:
+        frame = several.frames.get(family.name, {})
+        parts = frame.get("parts", {})
+        if not {"head", "start"} <= parts.keys() or "coding" in frame or family.ended or rng.random() < 0.2:
+            continue
+        fixed = parts["head"]["bits"]["fixed"]["const"] << 6
+        starts = {fixed | spare << 5 | number for number in family.ids for spare in (0, 1)}
+        if starts.isdisjoint(
+            first for name in several.frames if name != family.name for first in _begun(several, name)
+        ):
+            _lead(parts, "head")
+            return
+
+
+def _lead(parts: Doc, name: str) -> None:
+    """Move a part to the beginning of a frame, in place of the constant there."""
+    rest = {each: spec for each, spec in parts.items() if each not in ("start", name)}
+    for spec in (each for each in rest.values() if isinstance(each, dict)):
+        for key in ("over", "counts"):
+            if isinstance(spec.get(key), list):
+                seeds = [each for each in spec[key] if each.startswith("attribute.")]
+                spec[key] = [each for each in (name, *rest) if each in spec[key]] + seeds or [name]
+    first = parts[name]
+    parts.clear()
+    parts |= {name: first, **rest}
 
 
 def _begun(several: Kinds, name: str) -> set[int]:

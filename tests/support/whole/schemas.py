@@ -105,6 +105,7 @@ class _Maker:
             document |= self._kinds(several, maker, document["bus"])
             kinds.lead_with_ids(random.Random(f"ids {self.seed}"), several)
             kinds.lead_with_addresses(random.Random(f"addresses {self.seed}"), several, document["bus"])
+            kinds.lead_with_bits(random.Random(f"bits {self.seed}"), several)
             self._dialogue_by_turn(several, maker, document["commands"])
         else:
             document |= self._traffic(shape, maker, document["bus"])

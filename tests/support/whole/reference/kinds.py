@@ -56,6 +56,8 @@ class Kinds:
                     if frame.parts[0].spec.get("role") == "address":
                         spans = {span for each in those for span in each.addresses}
                         numbers = {number for first, last in spans for number in range(first, last + 1)}
+                    elif "bits" in frame.parts[0].spec:
+                        numbers = _bytes_of(frame, numbers)
                     frame.starts = tuple(put(frame.parts[0].pieces, number) for number in numbers)
                     frame.bare = False
 
@@ -133,6 +135,21 @@ class Kinds:
     def searcher(self, known: Mapping[int, Message], direction: str) -> KindSearcher:
         """A receiver of these messages."""
         return KindSearcher(self.ways["response" if direction == "response" else "request"], known)
+
+
+def _bytes_of(frame: Frame, ids: set[int]) -> set[int]:
+    """The numbers that the first part of a frame may have, by its constants and pieces of these ids."""
+    first, at, found = frame.parts[0], 0, set[int]()
+    pieces: list[tuple[int, int, int]] = []
+    for name, shift, bits, _ in reversed(frame.id_bits()):
+        pieces += [(shift, bits, at)] if name == first.name else []
+        at += bits
+    for byte in filter(first.accepts, range(first.mask + 1)):
+        for number in ids:
+            alike = (byte >> shift ^ number >> place for shift, _, place in pieces)
+            if not any(each & (1 << bits) - 1 for each, (_, bits, _) in zip(alike, pieces, strict=True)):
+                found.add(byte)
+    return found
 
 
 def address_of(data: Doc) -> str | None:
