@@ -19,7 +19,6 @@ from qlinkgen.model.fields import Value
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line
-from qlinkgen.model.types import Array, Enum, Flags, Scalar
 
 Items = list[CompletionItem]
 
@@ -84,23 +83,9 @@ def _values(values: dict[str, Value], name: str, begun: str) -> Items:
     """Return the values of a field that begin so; the last of several flags is completed."""
     if name not in values:
         return []
-    names, between = value_names(values[name])
+    names, between = values[name].names
     head, mark, last = begun.rpartition(between) if between else ("", "", begun)
     return [CompletionItem(f"{head}{mark}{each.value}") for each in _beginning(last, names)]
-
-
-def value_names(value: Value) -> tuple[tuple[str, ...], str]:
-    """Return the names that a field may have as its value, and the mark between several of them, or ""."""
-    many = isinstance(value.type, Array)
-    kind = value.type.item if isinstance(value.type, Array) else value.type
-    meaning = kind.meaning if isinstance(kind, Scalar) else None
-    if meaning == "bool":
-        return ("true", "false"), "," if many else ""
-    if isinstance(meaning, Enum):
-        return tuple(each.name for each in meaning.members), "," if many else ""
-    if isinstance(meaning, Flags) and not many:
-        return tuple(each.name for each in meaning.members), "|"
-    return (), ""
 
 
 def _about(value: Value) -> str:

@@ -10,7 +10,7 @@ from typing import ClassVar, SupportsInt, assert_never
 from qlinkgen.model.condition import Condition
 from qlinkgen.model.greatest import greatest
 from qlinkgen.model.texts import Text
-from qlinkgen.model.types import Array, BitField, Bits, Blob, Length, Scalar
+from qlinkgen.model.types import Array, BitField, Bits, Blob, Enum, Flags, Length, Scalar
 
 
 @dataclass(frozen=True)
@@ -274,6 +274,20 @@ class Value:
         """The unit of its numbers, "" for bytes, text and records."""
         kind = self.type.item if isinstance(self.type, Array) else self.type
         return kind.unit if isinstance(kind, Scalar) else ""
+
+    @property
+    def names(self) -> tuple[tuple[str, ...], str]:
+        """The names that it may have, and the mark between several of them: "" if it has one."""
+        many = isinstance(self.type, Array)
+        kind = self.type.item if isinstance(self.type, Array) else self.type
+        meaning = kind.meaning if isinstance(kind, Scalar) else None
+        if meaning == "bool":
+            return ("true", "false"), "," if many else ""
+        if isinstance(meaning, Enum):
+            return tuple(each.name for each in meaning.members), "," if many else ""
+        if isinstance(meaning, Flags) and not many:
+            return tuple(each.name for each in meaning.members), "|"
+        return (), ""
 
 
 def greatest_size(fields: Iterable[Field]) -> int:
