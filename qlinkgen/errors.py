@@ -21,6 +21,7 @@
         * `CapabilityMissing`: the port does not support an operation
     * `HexFileError`: an Intel HEX file cannot be sent to a node (also a `ValueError`)
     * `ImportFileError`: nothing can be imported from a file of another format (also a `ValueError`)
+    * `CaptureError`: a file is not a recording that can be read (also a `ValueError`)
     * `ExtraMissing`: an optional dependency is not installed (also an `ImportError`)
 
 Generated modules do not import this module; they define their own `EncodeError` and `DecodeError`.
@@ -35,6 +36,7 @@ from typing import Literal, TypedDict, Unpack
 __all__ = [
     "BadReply",
     "CapabilityMissing",
+    "CaptureError",
     "CodecError",
     "Collision",
     "CommandError",
@@ -329,6 +331,10 @@ class ImportFileError(QlinkgenError, ValueError):
     def __str__(self) -> str:
         """Return `file:line: message`."""
         return ":".join([*filter(None, (self.file, str(self.line or ""))), f" {self.message}"]).lstrip()
+
+
+class CaptureError(QlinkgenError, ValueError):
+    """A file is not a recording that can be read."""
 
 
 class ExtraMissing(QlinkgenError, ImportError):
