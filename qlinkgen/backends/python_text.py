@@ -32,6 +32,11 @@ def numbers(text: str) -> str:
     return '"' + "".join(map(escaped, text)) + '"'
 
 
+def real(value: float) -> str:
+    """A floating-point number, with its exponent as ruff writes it."""
+    return repr(value).replace("e+", "e")
+
+
 def docstring(lines: Iterable[str]) -> list[str]:
     """Lines as a docstring; after several lines the closing quotes have their own line."""
     first, *others = map(_in_docstring, lines)

@@ -199,6 +199,8 @@ def _literal(value: Node) -> str:
         return f"({', '.join(map(_literal, value))}{',' if len(value) == 1 else ''})"
     if isinstance(value, str):
         return python_text.literal(value)
+    if isinstance(value, float):
+        return python_text.real(value)
     text = repr(value)
     if isinstance(value, bytes) and '"' not in text and text.endswith("'"):
         text = text.replace("'", '"', 1)[:-1] + '"'

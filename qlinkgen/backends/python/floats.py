@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from qlinkgen.backends import python_text
 from qlinkgen.backends.python import integers
 from qlinkgen.model.integer import ByteOrder, Integer
 from qlinkgen.model.types import Float, Scalar
@@ -24,4 +25,7 @@ def format_of(kind: Float, integer: Integer, count: str = "") -> str:
 
 def holds(kind: Float, number: str) -> list[str]:
     """The expression that is true if a number is legal, none if all are."""
-    return [f"{kind.bounds[0]!r} <= {number} <= {kind.bounds[1]!r}"] if kind.bounds else []
+    if not kind.bounds:
+        return []
+    low, high = map(python_text.real, kind.bounds)
+    return [f"{low} <= {number} <= {high}"]

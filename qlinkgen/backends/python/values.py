@@ -312,7 +312,14 @@ def _number_rule(name: str, number: Scalar, place: Place, scales: Mapping[str, s
         case Flags(reserved_zero=True) as flags:
             return _rule(place, "MaskRule", name, f"0x{flags.mask:X}")
         case Float() as kind:
-            return _rule(place, "FloatRule", name, kind.bits, *(kind.bounds or ()), unit=number.unit)
+            return _rule(
+                place,
+                "FloatRule",
+                name,
+                kind.bits,
+                *map(python_text.real, kind.bounds or ()),
+                unit=number.unit,
+            )
         case Characters(size, b""):
             return _rule(place, "TextRule", name, size, size)
         case Characters(size, excluded):
