@@ -377,10 +377,6 @@ def _excess(part: Part) -> str:
         return "may begin the next frame"
     if part.trim is not None:
         return "is trimmed"
-    if part.checksum and part.checksum.every:
-        return "has a value for each block"
-    if part.checksum and part.checksum.otherwise is not None:
-        return "has a value for nothing"
     return ""
 
 

@@ -231,7 +231,7 @@ _ALL = (
         "The first bytes of kinds of frame tell them apart; each message knows its kind.",
         "A receiver tries each kind of its direction where one may begin. A kind with if: {direction: "
         "request} has no answers, and may begin like one of the other direction; one with parts of one "
-        "direction has no messages without a direction. Kinds have no idle line, trim or blocks, do not "
+        "direction has no messages without a direction. Kinds have no idle line and no trim, do not "
         "end with the bytes that they begin with, and no coding of their first part. A value or a counter of "
         "several kinds is the same in all. A message without frame travels in the kinds that no message "
         "names, which then have the same parts except constants, lengths and check values; the shortest one "

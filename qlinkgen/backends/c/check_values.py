@@ -132,7 +132,8 @@ class CheckWriter(Places):
     @cached_property
     def algorithms(self) -> Mapping[Checksum, CheckView]:
         """Each algorithm of frames, the main one first."""
-        found = dict[Checksum, None]()
+        mains = (each.check for each in self.every)
+        found = dict.fromkeys(each.check.algorithm for each in mains if each)
         for envelope in self.every:
             found |= dict.fromkeys(each.algorithm for each in envelope.algorithms)
         return {each: render(each, number) for number, each in enumerate(found, 1)}

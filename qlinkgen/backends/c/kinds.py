@@ -117,7 +117,7 @@ def _unproven(plan: Plan) -> str:
     """The condition for a received frame of a kind without check value, "" if all have one."""
     terms = []
     for kind in plan.frame.sought:
-        if kind.envelope.checks:
+        if kind.envelope.checks or kind.envelope.blocks:
             continue
         goes = _goes(plan, kind, "receiver->direction")
         if not kind.envelope.preamble:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import assert_never
 
 from qlinkgen.backends.python import integers, pieces, values
-from qlinkgen.backends.python.check_views import CheckView, PlacedCheck
+from qlinkgen.backends.python.check_views import CheckView
 from qlinkgen.backends.python.conditional import AfterView, after_view
 from qlinkgen.backends.python.decode import Decoder
 from qlinkgen.backends.python.encode import Encoder
@@ -206,7 +206,7 @@ def kinds_view(plan: Plan, title: str, make: Maker) -> KindsView:
         lasts=list(dict.fromkeys(last for view in views.values() for last in _lasts(view.parts))),
         eager=any(_is_eager(view.parts) for view in views.values()),
         check=check,
-        makers=frozenset(each.view.maker for view in views.values() for each in _every_check(view.parts)),
+        makers=frozenset(each.maker for view in views.values() for each in _every_check(view.parts)),
     )
 
 
@@ -252,9 +252,11 @@ def _unreplaced(view: PartsView) -> PartsView:
     return replace(view, kind=replace(view.kind, passes=False))
 
 
-def _every_check(view: PartsView) -> Sequence[PlacedCheck]:
-    """The check values of frames, those included that only some have."""
-    return [*view.checks, *(view.after.checks if view.after else ())]
+def _every_check(view: PartsView) -> Iterator[CheckView]:
+    """The check values of frames, those included that only some have, and of blocks."""
+    yield from (each.view for each in (*view.checks, *(view.after.checks if view.after else ())))
+    if view.blocks:
+        yield view.blocks.view
 
 
 def _lasts(view: PartsView) -> Iterator[str]:
@@ -288,7 +290,7 @@ def _kind(frame: FramePlan, plan: Plan, make: Maker) -> KindView:
         holds=members is not None,
         seeded=bool(envelope.seeded),
         front=" + ".join(_bytes(part) for part in envelope.front) or 'b""',
-        back=" + ".join(_bytes(part) for part in envelope.back),
+        back=" + ".join(_bytes(part) for part in envelope.back if not isinstance(part, BlocksPart)),
         turned=frame.turned,
     )
 

@@ -90,6 +90,7 @@ def draw(rng: random.Random) -> Kinds:
     _add_one_way(random.Random(repr(more.getstate())), frames, families)
     _add_codings(random.Random(f"codings {more.getstate()!r}"), frames)
     _add_conditions(random.Random(f"conditions {more.getstate()!r}"), frames, families)
+    _add_blocks(random.Random(f"blocks {more.getstate()!r}"), frames)
     mixed = list(frames)
     rng.shuffle(mixed)
     return Kinds({name: frames[name] for name in mixed}, families)
@@ -286,6 +287,29 @@ def _add_conditions(rng: random.Random, frames: Doc, families: list[Family]) -> 
         for name, spec in parts.items():
             if spec.keys() == {"role", "value"}:
                 parts[name] = spec["value"]
+
+
+def _add_blocks(rng: random.Random, frames: Doc) -> None:
+    """Check values for blocks of the payload of one kind of frame, or one for no payload."""
+    plain = {"start", "code", "node", "length", "data", "head", "group", "second", "stop", "crc"}
+    for spec in frames.values():
+        parts: Doc = spec["parts"]
+        check = parts.get("crc", {"over": []})
+        seeded = any(name.startswith("attribute.") for name in check["over"])
+        able = {"length", "data"} <= parts.keys() <= plain and not seeded and "coding" not in spec
+        if not able or rng.random() < 0.5:
+            continue
+        if "crc" in parts and rng.random() < 0.5:
+            parts["crc"] = {**check, "over": ["data"], "otherwise": rng.choice((0, 5, 255))}
+            return
+        every = rng.choice(("4 bytes", "16 bytes"))
+        blocks = {"type": "u8", "algorithm": "sum8", "over": ["data"], "every": every}
+        names = [name for name in parts if name != "crc"]
+        names.insert(names.index("data") + 1, "sums")
+        found = {name: blocks if name == "sums" else parts[name] for name in names}
+        parts.clear()
+        parts |= found
+        return
 
 
 def _name_roles(parts: Doc) -> None:
