@@ -1,6 +1,7 @@
 """Recordings of serial lines as pcapng files, which Wireshark opens as well.
 
-`Writer` appends packets to a file, `read_pcapng` returns those of a file.
+`Writer` appends packets to a file, `read_pcapng` returns those of a file; `qlinkgen.captures.recording`
+writes the frames of buses.
 """
 
 from qlinkgen.captures.pcapng import Direction, Interface, Packet

@@ -18,7 +18,7 @@ from qlinkgen.cli.fuzz_run import RESULTS, Bench, Outcome, Tally
 from qlinkgen.cli.kinds import BUS, kind_of
 from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.cli.tables import Table
-from qlinkgen.cli.tracing import Trace, trace_option
+from qlinkgen.cli.tracing import Printer, Trace, trace_option
 from qlinkgen.cli.wire_options import (
     Parity,
     baud_option,
@@ -114,7 +114,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     address = _address(loaded, commands, node)
     codec = load_codec(loaded)
     cases = Cases(plan_of(loaded), codec, commands, address, seed, everything=everything)
-    trace = Trace(loaded, codec) if traced else None
+    trace = Trace(loaded, codec, Printer(loaded)) if traced else None
     line = line_of(parity, stop_bits, trace.hear if trace else None)
     try:
         with open_usual(loaded, port, baud, line) as opened:

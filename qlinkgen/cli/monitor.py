@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import ExitStack
 
 import click
 
@@ -12,6 +13,7 @@ from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, check_options, kind_of
 from qlinkgen.cli.stopping import StopSignals
+from qlinkgen.cli.tracing import Listener, record_option
 from qlinkgen.cli.wire_options import (
     Parity,
     baud_option,
@@ -35,6 +37,7 @@ BELONGS: Belongs = {"slack": (BUS,)}
 @click.option("--raw", is_flag=True, help="Add the bytes of each frame.")
 @click.option("--count", type=click.IntRange(1), metavar="N", help="End after N frames, damaged ones too.")
 @click.option("--seconds", "length", callback=seconds, metavar="SECONDS", help="End after this time.")
+@record_option
 @baud_option
 @slack_option
 @parity_option
@@ -47,6 +50,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     raw: bool,
     count: int | None,
     length: float | None,
+    record: str | None,
     baud: int | None,
     slack: float | None,
     parity: Parity,
@@ -83,17 +87,21 @@ def command(  # noqa: PLR0917  # click passes them by name
     codec = load_codec(loaded)
     line = line_of(parity, stop_bits)
     opener = open_free if kind is RING else open_usual
-    with StopSignals() as signals, opener(loaded, port, baud, line) as opened:
+    with ExitStack() as ended, StopSignals() as signals, opener(loaded, port, baud, line) as opened:
+        listener = None if record is None else Listener(ended, record, port, opened, codec)
         end = math.inf if length is None else opened.now() + length
         click.echo(f"qlinkgen: listening to {loaded.name} on {port}; press Ctrl-C to stop", err=True)
         if kind is RING:
             from qlinkgen.cli.monitor_ring import monitor_ring  # noqa: PLC0415  # only for rings
 
-            monitor_ring(loaded, codec, opened, signals, as_json=as_json, raw=raw, count=count, end=end)
+            monitor_ring(
+                loaded, codec, opened, signals, as_json=as_json, raw=raw, count=count, end=end,
+                listener=listener,
+            )  # fmt: skip
         else:
             from qlinkgen.cli.monitor_bus import monitor_bus  # noqa: PLC0415
 
             monitor_bus(
                 loaded, codec, opened, signals, as_json=as_json, raw=raw, count=count, end=end, slack=slack,
-                accepts=matching(protocol),
+                accepts=matching(protocol), listener=listener,
             )  # fmt: skip

@@ -6,15 +6,18 @@ import math
 import sys
 from collections.abc import Mapping
 from types import ModuleType
+from typing import assert_never
 
 import click
 
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.hearing import Teller
 from qlinkgen.cli.stopping import StopSignals
+from qlinkgen.cli.tracing import Listener
 from qlinkgen.cli.wire_options import counted
-from qlinkgen.link.events import Damaged
-from qlinkgen.link.monitor import Heard, Monitor, Unanswered
+from qlinkgen.link.codec import Fault, Framed
+from qlinkgen.link.events import Damaged, Stray
+from qlinkgen.link.monitor import Asked, Heard, Monitor, Replied, Unanswered
 from qlinkgen.link.transaction import Accepts
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.transport.conversation import timing_of
@@ -36,11 +39,12 @@ def monitor_bus(
     end: float,
     slack: float | None,
     accepts: Mapping[str, Accepts] | None,
+    listener: Listener | None = None,
 ) -> None:
     """Print the traffic until a time, a number of frames, or a signal; then a summary."""
     teller = Teller(protocol, codec, port.now(), raw=raw)
     monitor = Monitor(codec, timing_of(codec, port, slack=slack), accepts=accepts)
-    session = _Session(monitor, teller, as_json=as_json, count=count)
+    session = _Session(monitor, teller, as_json=as_json, count=count, listener=listener)
     try:
         session.listen(port, end, signals)
     finally:
@@ -50,10 +54,19 @@ def monitor_bus(
 class _Session:
     """Feeds a monitor from a port, prints its events, and counts."""
 
-    def __init__(self, monitor: Monitor, teller: Teller, *, as_json: bool, count: int | None) -> None:
+    def __init__(
+        self,
+        monitor: Monitor,
+        teller: Teller,
+        *,
+        as_json: bool,
+        count: int | None,
+        listener: Listener | None,
+    ) -> None:
         """Stop after `count` frames."""
         self._monitor = monitor
         self._teller = teller
+        self._listener = listener
         self._as_json = as_json
         self._left = math.inf if count is None else count
         self._frames = self._faults = self._unanswered = 0
@@ -75,6 +88,8 @@ class _Session:
             limit = min(end, now + LOOK if due is None else min(due, now + LOOK))
             data = port.read(max(0.0, limit - now))
             now = port.now()
+            if data and self._listener is not None:
+                self._listener.hear(now, data)
             if data:
                 monitor.receive(data, now)
             monitor.handle_timer(now)
@@ -84,6 +99,8 @@ class _Session:
         heard = self._monitor.heard
         if not heard:
             return
+        if self._listener is not None:
+            self._listener.found([found for each in heard if (found := _frame(each)) is not None])
         while heard and self._left:
             self._show(heard.popleft())
         heard.clear()
@@ -107,3 +124,20 @@ class _Session:
             f"{counted(self._unanswered, 'request')} not answered; "
             f"{self._monitor.skipped} of {counted(self._monitor.bytes, 'byte')} outside frames"
         )
+
+
+def _frame(heard: Heard) -> tuple[Framed | Fault, bytes] | None:
+    """Return the message or the fault of an event, and its bytes; None if it has none."""
+    match heard:
+        case Asked():
+            return heard.request, heard.frame
+        case Replied():
+            return heard.response, heard.frame
+        case Stray():
+            return heard.message, heard.message.to_frame()
+        case Damaged():
+            return heard.fault, bytes(heard.fault.raw)
+        case Unanswered():
+            return None
+        case _:
+            assert_never(heard)

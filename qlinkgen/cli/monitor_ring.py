@@ -9,6 +9,7 @@ import click
 
 from qlinkgen.cli.ring_hearing import RingPrinter, RingTeller
 from qlinkgen.cli.stopping import StopSignals
+from qlinkgen.cli.tracing import Listener
 from qlinkgen.cli.wire_options import counted
 from qlinkgen.link.codec import Fault, Framed, is_message
 from qlinkgen.model.protocol import Protocol
@@ -28,10 +29,11 @@ def monitor_ring(
     raw: bool,
     count: int | None,
     end: float,
+    listener: Listener | None = None,
 ) -> None:
     """Print the traffic of a fibre until a time, a number of messages, or a signal; then a summary."""
     teller = RingTeller(protocol, codec, port.now(), raw=raw)
-    session = _Session(codec, teller, RingPrinter(teller, as_json=as_json, count=count))
+    session = _Session(codec, teller, RingPrinter(teller, as_json=as_json, count=count), listener)
     try:
         session.listen(port, end, signals)
     finally:
@@ -41,10 +43,13 @@ def monitor_ring(
 class _Session:
     """Feeds a decoder from a port, and prints its events."""
 
-    def __init__(self, codec: ModuleType, teller: RingTeller, printer: RingPrinter) -> None:
+    def __init__(
+        self, codec: ModuleType, teller: RingTeller, printer: RingPrinter, listener: Listener | None
+    ) -> None:
         self._decoder = codec.StreamDecoder()
         self._teller = teller
         self._printer = printer
+        self._listener = listener
         self._bytes = 0
 
     def listen(self, port: Port, end: float, signals: StopSignals) -> None:
@@ -52,10 +57,16 @@ class _Session:
         while not self._printer.done and port.now() < end and not signals.stopped:
             data = port.read(max(0.0, min(LOOK, end - port.now())))
             self._bytes += len(data)
+            if self._listener is not None:
+                self._listener.hear(port.now(), data)
             self._print(self._decoder.feed(data), port.now())
         self._print(self._decoder.finish(), port.now())
 
     def _print(self, found: Sequence[Framed | Fault], now: float) -> None:
+        if self._listener is not None:
+            self._listener.found(
+                [(each, each.to_frame() if is_message(each) else bytes(each.raw)) for each in found]
+            )
         for each in found:
             if is_message(each):
                 told = self._teller.message(now, each, each.to_frame())

@@ -25,7 +25,7 @@ from qlinkgen.cli.encode import compose
 from qlinkgen.cli.kinds import BUS, is_shipped, kind_of
 from qlinkgen.cli.send_bus import check_request
 from qlinkgen.cli.tables import Table
-from qlinkgen.cli.tracing import Trace, trace_option
+from qlinkgen.cli.tracing import Printer, Trace, trace_option
 from qlinkgen.cli.wire_options import (
     Parity,
     baud_option,
@@ -108,7 +108,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     codec = load_codec(loaded)
     questions = [(message, assignments)] if message else questions_of(protocol, loaded)
     asked = [_asker(loaded, codec, question, numbers[0]) for question in questions]
-    trace = Trace(loaded, codec) if traced else None
+    trace = Trace(loaded, codec, Printer(loaded)) if traced else None
     line = line_of(parity, stop_bits, trace.hear if trace else None)
     try:
         with open_usual(loaded, port, baud, line) as opened, _progress() as show:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from types import ModuleType
 from typing import Literal
 
@@ -18,7 +19,7 @@ from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.encode import address_option, compose, json_option
 from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, is_shipped, kind_of
 from qlinkgen.cli.send_bus import check_request, further_of, send_on_bus
-from qlinkgen.cli.tracing import Trace, trace_option
+from qlinkgen.cli.tracing import record_option, trace_of, trace_option
 from qlinkgen.cli.wire_options import (
     Parity,
     attempts_option,
@@ -97,6 +98,7 @@ BELONGS: Belongs = {
     help="Send it again and again with this period, until Ctrl-C or --count.",
 )
 @trace_option
+@record_option
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
@@ -119,6 +121,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     count: int | None,
     every: float | None,
     traced: bool,
+    record: str | None,
     crc: str | None,
 ) -> int:
     """Send a request on PORT and print the response like decode: one JSON object.
@@ -153,15 +156,15 @@ def command(  # noqa: PLR0917  # click passes them by name
     check_options(loaded.name, kind, BELONGS)
     own = _own_codec(protocol, kind)
     codec, found, request = compose(loaded, message, assignments, addresses, object_, codec=own)
-    trace = Trace(loaded, codec) if traced else None
-    line = line_of(parity, stop_bits, trace.hear if trace else None)
     if kind is not RING:
         check_request(loaded, found)
     try:
         request.to_frame()
     except codec.EncodeError as error:
         raise Failure(str(error)) from None
-    try:
+    with ExitStack() as ended:
+        trace = trace_of(loaded, codec, port, ended, traced=traced, record=record)
+        line = line_of(parity, stop_bits, trace.hear if trace else None)
         if kind is RING:
             from qlinkgen.cli.send_ring import send_into_ring  # noqa: PLC0415  # only for rings
 
@@ -180,9 +183,6 @@ def command(  # noqa: PLR0917  # click passes them by name
             loaded, codec, request, port, further=further, baud=baud, line=line,
             attempts=attempts, slack=slack, echo=echo, accepts=matching(protocol), count=count, every=every,
         )  # fmt: skip
-    finally:
-        if trace is not None:
-            trace.end()
 
 
 def _own_codec(name: str, kind: Kind) -> ModuleType | None:

@@ -13,7 +13,7 @@ from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.kinds import BUS, kind_of
 from qlinkgen.cli.shell_lines import Lines, Reader, perform_all
-from qlinkgen.cli.tracing import Trace, trace_option
+from qlinkgen.cli.tracing import Printer, Trace, trace_option
 from qlinkgen.cli.wire_options import (
     Parity,
     attempts_option,
@@ -81,7 +81,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     if node is not None and number is None:
         raise Failure(f"--node {node}: not a whole number")
     codec = load_codec(loaded)
-    trace = Trace(loaded, codec) if traced else None
+    trace = Trace(loaded, codec, Printer(loaded)) if traced else None
     line = line_of(parity, stop_bits, trace.hear if trace else None)
     with open_usual(loaded, port, baud, line) as opened:
         timing = timing_of(codec, opened, slack=slack, attempts=attempts)

@@ -9,7 +9,7 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, kind_of, shipped_kind
 from qlinkgen.cli.simulating import plan_of
-from qlinkgen.cli.tracing import trace_option
+from qlinkgen.cli.tracing import record_option, trace_option
 from qlinkgen.cli.wire_options import seconds
 
 BELONGS: Belongs = {
@@ -73,6 +73,7 @@ BELONGS: Belongs = {
     help="Create a link to a second port, where all bytes of a bus can be read.",
 )
 @trace_option
+@record_option
 @click.option("--faults", metavar="SPEC", help="Faults: drop=0.01,late=0.02:0.05-0.2 or all=0.05.")
 @click.option("--seed", type=int, metavar="N", help="Seed of faults, noise and refusals.")
 @click.option(
@@ -99,6 +100,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     link: str | None,
     tap: str | None,
     traced: bool,
+    record: str | None,
     faults: str | None,
     seed: int | None,
     baud: int | None,
@@ -152,11 +154,12 @@ def command(  # noqa: PLR0917  # click passes them by name
             keys=keys,
             closed=closed,
             seconds=length,
+            record=record,
         )
     elif kind is HOST:
         from qlinkgen.cli.simulate_host import simulate_host  # noqa: PLC0415
 
-        simulate_host(link=link, baud=baud, plan=plan)
+        simulate_host(link=link, baud=baud, plan=plan, record=record)
     else:
         from qlinkgen.cli.behaviour import Behaviour  # noqa: PLC0415
         from qlinkgen.cli.simulate_bus import simulate_bus  # noqa: PLC0415
@@ -173,6 +176,7 @@ def command(  # noqa: PLR0917  # click passes them by name
             behaviour=behaviour,
             tap=tap,
             traced=traced,
+            record=record,
         )
 
 

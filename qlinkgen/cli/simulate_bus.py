@@ -10,14 +10,13 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import load_protocol
 from qlinkgen.cli.kinds import is_shipped
-from qlinkgen.cli.simulating import run_bus, say
-from qlinkgen.cli.tracing import LineTrace
+from qlinkgen.cli.simulating import run_bus, say, watch_line
 from qlinkgen.cli.wire_options import ANY_SPEED, counted, parse_nodes, with_crc
 from qlinkgen.link.codec import Codec, Framed
 from qlinkgen.link.slave import Node, SlaveEngine
 from qlinkgen.plan import plan_of
 from qlinkgen.protocols.qlink.facts import NODES
-from qlinkgen.sim import OUTSIDE, FaultPlan, Wire
+from qlinkgen.sim import FaultPlan, Wire
 from qlinkgen.transport.conversation import OTHER_PROGRAM
 
 #: Byte times from a request to its response on a paced line, so that the master can release the line.
@@ -36,6 +35,7 @@ def simulate_bus(
     behaviour: Behaviour,
     tap: str | None = None,
     traced: bool = False,
+    record: str | None = None,
 ) -> None:
     """Run the nodes on a pty until a signal."""
     from qlinkgen.sim.pty_bus import PtyBus  # noqa: PLC0415  # needs a system that has ptys
@@ -57,11 +57,10 @@ def simulate_bus(
         if tap is not None:
             ear = ended.enter_context(open_pty(tap, baud=baud or ANY_SPEED))
             wire.taps.append(lambda _at, _source, data: ear.write(data))
-        if traced:
+        if traced or record is not None:
             loaded = load_protocol(protocol, crc)
-            trace = LineTrace(loaded, load_codec(loaded))
-            ended.callback(trace.end)
-            wire.taps.append(lambda at, source, data: trace.hear(at, source == OUTSIDE, data))
+            name = link or f"simulated {loaded.name}"
+            watch_line(wire, loaded, load_codec(loaded), name, ended, traced=traced, record=record)
         run_bus(PtyBus(wire, link=link), link, what)
     say(_summary(engines), plan)
 

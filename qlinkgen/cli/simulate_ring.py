@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, assert_never
 
 import click
 
 from qlinkgen.cli.boundary import WRONG, Failure
+from qlinkgen.cli.common import load_protocol
 from qlinkgen.cli.ring_console import Console
 from qlinkgen.cli.ring_programs import programs_of, run_closed, run_open, scripts_of
-from qlinkgen.cli.simulating import run_bus, say
+from qlinkgen.cli.simulating import ring_tap, run_bus, say
 from qlinkgen.cli.wire_options import counted, with_crc
 from qlinkgen.link.ring import RingCodec, RingNode
 from qlinkgen.protocols.trio.basic import ProgrammedNode
@@ -38,6 +41,7 @@ def simulate_ring(
     keys: Sequence[str] = (),
     closed: bool = False,
     seconds: float | None = None,
+    record: str | None = None,
 ) -> None:
     """Run the ring until a signal, on a pty unless it is closed."""
     from qlinkgen.codecs import trio  # noqa: PLC0415  # only for Trio
@@ -55,21 +59,29 @@ def simulate_ring(
         for at, kind in enumerate(kinds, 1)
     ]
     what = f"{counted(len(kinds), 'node')} of trio"
-    try:
-        made = (
-            VirtualRing(places, baud=baud, faults=plan, codec=codec)
-            if closed
-            else _with_port(places, link, baud, plan, codec)
-        )
-    except SimulationError as error:
-        raise Failure(f"--ring {given}: {error}") from None
-    console = Console(made.wire, made.nodes, scripts)
-    if isinstance(made, VirtualRing):
-        run_closed(made, console, what=what, seconds=seconds)
-    elif not (loaded or scripts or console.drawn or seconds is not None):
-        run_bus(made, link, what)
-    else:
-        run_open(made, console, link=link, what=what, seconds=seconds)
+    with ExitStack() as ended:
+        taps = []
+        if record is not None:
+            clock = (lambda: 0.0) if closed else time.monotonic
+            loaded_trio = load_protocol("trio", crc)
+            taps.append(ring_tap(loaded_trio, trio, ended, record=record, baud=baud, clock=clock))
+        try:
+            made = (
+                VirtualRing(places, baud=baud, faults=plan, taps=taps, codec=codec)
+                if closed
+                else _with_port(places, link, baud, plan, codec)
+            )
+        except SimulationError as error:
+            raise Failure(f"--ring {given}: {error}") from None
+        console = Console(made.wire, made.nodes, scripts)
+        if isinstance(made, VirtualRing):
+            run_closed(made, console, what=what, seconds=seconds)
+        else:
+            made.wire.taps += taps
+            if loaded or scripts or console.drawn or seconds is not None:
+                run_open(made, console, link=link, what=what, seconds=seconds)
+            else:
+                run_bus(made, link, what)
     for place, node in enumerate(made.nodes, 1):
         say(f"address {place}, {_account(node)}", None)
     say(_summary(made.nodes), plan)

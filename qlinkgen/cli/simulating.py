@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from contextlib import ExitStack
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 import click
 
+from qlinkgen.captures.recording import Recording
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.stopping import StopSignals
-from qlinkgen.cli.wire_options import counted
-from qlinkgen.sim import FaultPlan, FaultPlanError
+from qlinkgen.cli.tracing import FibreTrace, LineTrace, Printer, Tell, Trace, keep
+from qlinkgen.cli.wire_options import ANY_SPEED, counted
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.sim import OUTSIDE, FaultPlan, FaultPlanError, Wire
+from qlinkgen.sim.wire import Tap
 
 if TYPE_CHECKING:
     from qlinkgen.sim.pty_bus import PtyBus
@@ -27,6 +34,51 @@ def plan_of(text: str | None, seed: int | None) -> FaultPlan | None:
         return FaultPlan.parse(f"{text},seed={seed}")
     except FaultPlanError as error:
         raise Failure(f"--faults {text}: {error}") from None
+
+
+def watch_line(
+    wire: Wire,
+    protocol: Protocol,
+    codec: ModuleType,
+    name: str,
+    ended: ExitStack,
+    *,
+    traced: bool,
+    record: str | None,
+) -> None:
+    """Print or record the requests and answers of a line until `ended`; `name` is that of the port."""
+    tells: list[Tell] = [Printer(protocol, "request", "answer")] if traced else []
+    if record is not None:
+        recording = ended.enter_context(Recording(record))
+        tells.append(keep(recording.port(name, codec, speed=wire.baud), turned=True))
+    if not tells:
+        return
+    trace = LineTrace(protocol, codec, *tells, baud=wire.baud or protocol.bus.baud or ANY_SPEED)
+    ended.callback(trace.end)
+    wire.taps.append(lambda at, source, data: trace.hear(at, source == OUTSIDE, data))
+
+
+def ring_tap(
+    protocol: Protocol,
+    codec: ModuleType,
+    ended: ExitStack,
+    *,
+    record: str,
+    baud: int | None,
+    clock: Callable[[], float],
+) -> Tap:
+    """Return what records each fibre of a ring until `ended`, as an interface named after who sends on it."""
+    recording = ended.enter_context(Recording(record))
+    fibres: dict[str, Trace] = {}
+
+    def tap(at: float, source: str, data: bytes) -> None:
+        if source not in fibres:
+            port = recording.port(source, codec, speed=baud, clock=clock)
+            fibres[source] = FibreTrace(protocol, codec, keep(port))
+            ended.callback(fibres[source].end)
+        fibres[source].hear(at, True, data)
+
+    return tap
 
 
 def run_bus(bus: PtyBus, link: str | None, what: str) -> None:

@@ -18,6 +18,7 @@ from qlinkgen.protocols.trio.options import NodeOptions, RingOptions
 from qlinkgen.sim.errors import SimulationError
 from qlinkgen.sim.programs import Programs
 from qlinkgen.sim.ring import Faults, RingWire
+from qlinkgen.sim.wire import Tap
 from qlinkgen.transport.ring_aio import AsyncRingDriver
 from qlinkgen.transport.ring_driver import GIVE_WAY, RingDriver
 
@@ -74,6 +75,7 @@ class VirtualRing:
         *,
         baud: int | None = None,
         faults: Faults = None,
+        taps: Iterable[Tap] = (),
         **options: Unpack[RingOptions],
     ) -> None:
         """Make a ring.
@@ -82,6 +84,7 @@ class VirtualRing:
             ring: see `make_nodes`; at most 15 nodes.
             baud: bits per second, or None for an unpaced ring.
             faults: a plan for all hops, or plans by the number of the node before the hop.
+            taps: functions that are told of all bytes, those at time 0 too; see `Wire`.
             options: options of each new node; see `RingNode`.
 
         Raises:
@@ -93,6 +96,7 @@ class VirtualRing:
         self.wire = RingWire(trio, baud=baud, faults=faults, outside=False)
         for number, node in enumerate(self.nodes):
             self.wire.attach(engine_of(node), f"node {number}")
+        self.wire.taps += taps
         self.wire.advance(0.0)
         self._programs = Programs(self.wire.step)
 
