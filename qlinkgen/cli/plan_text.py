@@ -37,7 +37,7 @@ from qlinkgen.plan.payload import (
     least_size,
     term_of,
 )
-from qlinkgen.plan.separated import TextStep, characters, needed
+from qlinkgen.plan.separated import TextStep, characters, most_texts, needed
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -125,7 +125,7 @@ def show_message_plan(plan: Plan, message: MessagePlan) -> None:
         heading("Sizes, in this order")
         paragraph([*sizes, f"{len(sizes) + 1}. the payload has {size_text(payload.size)} bytes"])
     if payload.separator:
-        least, most = needed(payload) - payload.leading, len(payload.steps)
+        least, most = needed(payload) - payload.leading, most_texts(payload) - payload.leading
         place = "after" if payload.leading else "divided by"
         texts = f"{span_text(least, most)} texts, {place} {payload.separator.decode()!r}"
         heading("Texts")

@@ -299,7 +299,9 @@ def separated_size(fields: Sequence[Field], *, leading: bool) -> tuple[int, int]
     """The minimum and maximum size of fields with separators between them, or before each of them."""
     without = int(not leading)
     needed = max((index for index, each in enumerate(fields, 1) if not each.omissible), default=0)
-    least = sum(each.min_size for each in fields[:needed]) + max(0, needed - without)
+    # A list without items has no separator either.
+    kept = [each for each in fields[:needed] if each.optional or not each.omissible]
+    least = sum(each.min_size for each in kept) + max(0, len(kept) - without)
     return least, sum(each.max_size for each in fields) + len(fields) - without
 
 

@@ -50,9 +50,20 @@ def most_texts(plan: PayloadPlan) -> int:
 
 
 def open_list(plan: PayloadPlan) -> ItemsStep | None:
-    """The list that takes the rest of the texts, None if there is none; it is the last step."""
-    last = plan.steps[-1] if plan.steps else None
-    return last if isinstance(last, ItemsStep) and not last.fixed else None
+    """The list that takes the texts that the other steps leave, None if there is none."""
+    return next((step for step in text_steps(plan) if isinstance(step, ItemsStep) and not step.fixed), None)
+
+
+def texts_behind(plan: PayloadPlan) -> int:
+    """Number of texts after the open list, all of which are needed; 0 if it is the last step."""
+    steps, opened = text_steps(plan), open_list(plan)
+    return sum(map(greatest_texts, steps[steps.index(opened) + 1 :])) if opened else 0
+
+
+def skipped(plan: PayloadPlan) -> ItemsStep | None:
+    """The open list before other steps if it may have no items, and then no separator; else None."""
+    opened = open_list(plan)
+    return opened if opened and not opened.length.minimum and texts_behind(plan) else None
 
 
 def characters(step: TextStep) -> tuple[int, int]:
@@ -66,18 +77,20 @@ def characters(step: TextStep) -> tuple[int, int]:
 
 def joined(plan: PayloadPlan, texts: list[bytes]) -> bytes:
     """The payload of the texts of all steps."""
+    steps, empty = text_steps(plan), skipped(plan)
+    texts = [text for step, text in zip(steps, texts, strict=True) if text or step is not empty]
     while len(texts) > needed_steps(plan) and not texts[-1]:
         texts = texts[:-1]
     texts = texts or [b""] * (not plan.leading)
     return plan.separator.join([b"", *texts] if plan.leading else texts)
 
 
-def _taken(step: TextStep, texts: list[bytes]) -> list[bytes]:
+def _taken(step: TextStep, texts: list[bytes], behind: int) -> list[bytes]:
     """The texts of a step from those that are left; an absent one is an empty text."""
     if not isinstance(step, ItemsStep):
         return texts[:1] or [b""]
-    own = texts if not step.fixed else texts[: step.length.maximum]
-    return [] if own == [b""] and not step.length.minimum else own
+    own = texts[: step.length.maximum if step.fixed else len(texts) - behind]
+    return [] if own == [b""] and not step.length.minimum and not behind else own
 
 
 def visit(plan: PayloadPlan, payload: bytes, beside: Mapping[str, object] = _NONE) -> Iterator[Visit]:
@@ -94,9 +107,10 @@ def visit(plan: PayloadPlan, payload: bytes, beside: Mapping[str, object] = _NON
         raise Wrong("", 0)
     if plan.leading:
         texts, at = texts[1:], min(1, len(payload))
+    behind = texts_behind(plan)
     for step in text_steps(plan):
-        own = _taken(step, texts)
-        texts = texts[max(1, len(own)) :]
+        own = _taken(step, texts, behind)
+        texts = texts[len(own) :]
         if not own:
             yield Visit(step, at, b"")
         for text in own:

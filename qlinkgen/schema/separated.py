@@ -28,12 +28,7 @@ def separated(
         end = frame.part("terminator")
         excluded += end.constant if end else b""
     barred = bytes(sorted(each for each in {*excluded} if each < 0x80))
-    for field in fields[:-1]:
-        if isinstance(field.type, Array) and not field.type.length.fixed:
-            what = f"nothing tells how many of the texts belong to {field.name}"
-            report.error(
-                _RULE, (*path, field.name), what, "put it last, or give it a constant number", of_key=True
-            )
+    _check_open(fields, path, report)
     return tuple(_checked(field, separator, barred, (*path, field.name), report) for field in fields)
 
 
@@ -95,6 +90,25 @@ def _checked(field: Field, separator: bytes, excluded: bytes, path: Path, report
     if (fault := _conflict(field.name, number.text, separator, excluded)) is not None:
         report.error(_RULE, path, *fault, of_key=True)
     return _listed(field, kind, separator, path, report) if isinstance(kind, Array) else field
+
+
+def _check_open(fields: Sequence[Field], path: Path, report: Reporter) -> None:
+    """Check that the number of texts tells the number of items of a list."""
+    opened = ""
+    for index, field in enumerate(fields):
+        if not isinstance(field.type, Array) or field.type.length.fixed:
+            continue
+        optional = next((each.name for each in fields[index + 1 :] if each.optional), "")
+        what = f"nothing tells how many of the texts belong to {field.name}"
+        if opened:
+            hint = f"give it, or {opened}, a constant number"
+            report.error(_RULE, (*path, field.name), what, hint, of_key=True)
+        elif optional:
+            hint = f"remove optional from {optional}, put it last, or give it a constant number"
+            report.error(
+                _RULE, (*path, field.name), f"{what}, since {optional} may be absent", hint, of_key=True
+            )
+        opened = opened or field.name
 
 
 def _listed(field: Field, kind: Array, separator: bytes, path: Path, report: Reporter) -> Field:

@@ -1,4 +1,4 @@
-"""Lists of numbers and words between separators; the last one takes what is there."""
+"""Lists of numbers and words between separators; one takes the texts that the other fields leave."""
 
 from __future__ import annotations
 
@@ -41,6 +41,20 @@ messages:
     id: LED
     separator: {before: " "}
     fields: {first: {type: u8, as: decimal}, levels: {type: "u8[1..3]", as: "hex[1..2]", range: 3..9}}
+  mid:
+    id: MID
+    fields:
+      note: {type: "text[1..3]", optional: true}
+      levels: {type: "i16[0..4]", as: decimal, scale: 1/10}
+      modes: {type: "mode[2]", default: ["on", "off"]}
+      unit: "text[0..2]"
+  top:
+    id: TOP
+    fields: {levels: {type: "u8[0..3]", as: decimal}, unit: "text[0..2]"}
+  one:
+    id: ONE
+    separator: {before: " "}
+    fields: {levels: {type: "u8[0..3]", as: decimal}, mode: mode}
 """
 
 
@@ -66,6 +80,14 @@ def codec(protocol: Protocol) -> Any:
         ("fix", {"flags": [True, False]}, b"1,0"),
         ("led", {"levels": [3]}, b" 0 3"),
         ("led", {"levels": [3, 9, 4]}, b" 0 3 9 4"),
+        ("mid", {}, b",ON,OFF,"),
+        ("mid", {"note": "ab", "unit": "mA"}, b"ab,ON,OFF,mA"),
+        ("mid", {"levels": [1.5, -2.0], "modes": [2, 1]}, b",1.5,-2.0,AUTO,ON,"),
+        ("top", {}, b""),
+        ("top", {"levels": [7]}, b"7,"),
+        ("top", {"levels": [7, 0, 255], "unit": "V"}, b"7,0,255,V"),
+        ("one", {}, b" OFF"),
+        ("one", {"levels": [1, 2, 3], "mode": 1}, b" 1 2 3 ON"),
     ],
 )
 def test_lists(protocol: Protocol, codec: Any, name: str, values: dict[str, Any], payload: bytes) -> None:
@@ -78,6 +100,7 @@ def test_lists(protocol: Protocol, codec: Any, name: str, values: dict[str, Any]
     assert live.payload(name, live.messages[name].parse(payload)) == payload
     assert pack(plan, unpack(plan, payload)) == payload
     assert plan.least <= len(payload) <= plan.most
+    assert live.messages[name].least == plan.least
 
 
 def test_a_constant_number_of_texts_varies_in_size() -> None:
@@ -97,6 +120,7 @@ def test_c_counts_the_texts_of_earlier_lists(protocol: Protocol) -> None:
     (header,) = c.generate(protocol, Options()).values()
     assert "size_t count = (texts > 3U) ? (texts - 3U) : 0U;" in header
     assert "const size_t count = (texts > 2U) ? (texts - 2U) : 0U;" in header
+    assert "const size_t count = texts - 4U;" in header
 
 
 def test_a_separator_before_no_items_is_accepted(codec: Any) -> None:
@@ -107,6 +131,7 @@ def test_a_separator_before_no_items_is_accepted(codec: Any) -> None:
 def test_sizes(protocol: Protocol) -> None:
     plan = plan_of(protocol)
     assert [plan.message(name).payload.least for name in ("put", "fix", "led")] == [5, 0, 4]
+    assert [plan.message(name).payload.least for name in ("mid", "top", "one")] == [7, 0, 3]
     assert [plan.message(name).payload.most for name in ("put", "fix", "led")] == [9 + 1 + 3 + 4 * 8, 5, 13]
 
 
@@ -123,6 +148,12 @@ def test_sizes(protocol: Protocol) -> None:
         ("led", b" 0", ("length", "")),
         ("led", b" 0 ", ("length", "levels")),
         ("led", b" 0 3 A", ("range", "levels")),
+        ("mid", b"ON,OFF,", ("length", "")),
+        ("mid", b"ab,,ON,OFF,", ("length", "levels")),
+        ("mid", b"ab,1,x,ON,OFF,", ("range", "levels")),
+        ("mid", b"ab,1,2,ON,NO,", ("range", "modes")),
+        ("top", b",V", ("length", "levels")),
+        ("top", b"1,2,3,4,V", ("length", "")),
     ],
 )
 def test_wrong_lists(

@@ -23,7 +23,9 @@ from qlinkgen.plan.separated import (
     most_texts,
     needed,
     needed_steps,
+    skipped,
     text_steps,
+    texts_behind,
 )
 
 
@@ -31,15 +33,18 @@ def size_lines(payload: PayloadPlan, layouts: Layouts) -> list[str]:
     """Body of the function that returns the size of the payload of a struct."""
     steps = text_steps(payload)
     least = max(1, needed_steps(payload) + payload.leading)
-    lines = [f"size_t size = {least - 1}U;"]
+    empty = skipped(payload)
+    lines = [f"size_t size = {least - 1 - (empty is not None)}U;"]
     for index, step in enumerate(steps, int(payload.leading)):
         own = (
-            _list_size(step, layouts) if isinstance(step, ItemsStep) else [f"size += {_size(step, layouts)};"]
+            _list_size(step, layouts, separators=step is empty)
+            if isinstance(step, ItemsStep)
+            else [f"size += {_size(step, layouts)};"]
         )
         if index >= least:
             # The separators before it, of which those before the last field needed are counted.
             own.insert(0, f"after = {index - least + 1}U;")
-        guard = isinstance(step, ItemsStep) and not step.length.minimum
+        guard = isinstance(step, ItemsStep) and not step.length.minimum and step is not empty
         lines += _if(f"message->{step.name}_count > 0U", own) if guard else _guarded(step, own)
     if not any("message->" in line for line in lines):
         lines.append("(void)message;")
@@ -48,14 +53,14 @@ def size_lines(payload: PayloadPlan, layouts: Layouts) -> list[str]:
     return [lines[0], "size_t after = 0U;", *lines[1:], "return size + after;"]
 
 
-def _list_size(step: ItemsStep, layouts: Layouts) -> list[str]:
-    """Statements that add the size of a list that has items."""
+def _list_size(step: ItemsStep, layouts: Layouts, *, separators: bool) -> list[str]:
+    """Statements that add the size of a list: with a separator for each item, or for each but the last."""
     count = f"{step.length.maximum}U" if step.fixed else f"message->{step.name}_count"
     value = checks.as_unsigned(step.number, f"message->{naming.member(step.name)}[index]")
     digits = _digits(step.item)
     one = f"{digits.most}U" if digits.fixed else layouts.text("size", step.item, digits, value)
     return [
-        f"size += (size_t){count} - 1U;",
+        f"size += (size_t){count}{'' if separators else ' - 1U'};",
         *loop(count, [f"size += {one};"], count_type(step.length.maximum)),
     ]
 
@@ -143,12 +148,17 @@ class SeparatedEncoder(Encoder):
             lines += _guarded(step, self._flushed())
         self._refuse(["capacity < size"], "CAPACITY")
         lines += self._flushed()
+        empty = skipped(self.payload)
+        has_items = f"{local(empty.name)} > 0U" if empty else ""
         for index, step in enumerate(steps):
-            if index or self.payload.leading:
-                onward = ["++payload;", *(["--left;"] if step is not steps[-1] else [])]
-                put = [f"payload[0] = {separator};", *onward]
-                lines += _if("left > 0U", put)
-            lines += _guarded(step, self._text(step, last=step is steps[-1]))
+            onward = ["++payload;", *(["--left;"] if step is not steps[-1] else [])]
+            put = [f"payload[0] = {separator};", *onward] if index or self.payload.leading else []
+            text = _guarded(step, self._text(step, last=step is steps[-1]))
+            if step is empty:
+                lines += _if(has_items, [*put, *text]) if put else text
+                continue
+            first_text = index == 1 and steps[0] is empty and not self.payload.leading
+            lines += [*(_if(has_items if first_text else "left > 0U", put) if put else []), *text]
         return lines
 
     def _flushed(self) -> list[str]:
@@ -262,7 +272,14 @@ class SeparatedDecoder(Decoder):
         """Statements that read a list item by item, after so many other texts."""
         separator = unsigned(step.between[0], 8, hexadecimal=True)
         count, head = f"{step.length.maximum}U", list[str]()
-        if not step.fixed:
+        behind = texts_behind(self.payload)
+        if not step.fixed and behind:
+            count = "count"
+            head = [
+                f"const size_t count = texts - {before + behind}U;",
+                f"message->{step.name}_count = ({count_type(step.length.maximum)})count;",
+            ]
+        elif not step.fixed:
             count = "count"
             left = f"(texts > {before}U) ? (texts - {before}U) : 0U" if before else "texts"
             head = (

@@ -327,6 +327,12 @@ class Separated(Message):
         ]
         self.needed = max(needed, default=1)
         sizes = [_sizes(each) for each in fields]
+        # The list whose items take the texts that other fields leave, and their number.
+        counts = [_counts(each) for each in fields]
+        opened = [i for i, (low, high) in enumerate(counts) if low < high]
+        self.opened = opened[0] if opened else len(fields)
+        self.behind = sum(high for _, high in counts[self.opened + 1 :])
+        skipped = self.behind > 0 and not counts[self.opened][0]
         kept = sizes[: self.needed]
         absent = [each.name in self.optional for each in fields]
         least = sum(
@@ -335,7 +341,7 @@ class Separated(Message):
         if leading and not needed:
             self.needed = 0
         between = 0 if leading else 1
-        self.least = least + max(0, self.needed - between)
+        self.least = least + max(0, self.needed - between - skipped)
         self.most = sum(high for _, high in sizes) + len(sizes) - between
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
@@ -365,8 +371,12 @@ class Separated(Message):
     def _by_field(self, texts: list[bytes]) -> list[bytes]:
         """The texts of each field, those of a list with their separators."""
         cells = []
-        for field in self.fields:
+        for i, field in enumerate(self.fields):
             number = min(_counts(field)[1], len(texts))
+            if i == self.opened and self.behind:
+                number = len(texts) - self.behind
+                if texts[:number] == [b""]:
+                    raise RangeError(f"{field.name} has an empty item")
             cells.append(self.separator.join(texts[:number]))
             del texts[:number]
         return cells
@@ -379,6 +389,8 @@ class Separated(Message):
         texts = [self._text(field, values, path) for field in self.fields]
         while len(texts) > self.needed and not texts[-1]:
             texts.pop()
+        if self.behind and not texts[self.opened]:
+            del texts[self.opened]
         data = self.separator.join([b""] * self.leading + texts)
         stream_write(stream, data, len(data), path)
         return obj

@@ -22,7 +22,9 @@ from qlinkgen.plan.separated import (
     needed,
     needed_steps,
     open_list,
+    skipped,
     text_steps,
+    texts_behind,
 )
 
 #: Bits of a single-precision number.
@@ -39,7 +41,9 @@ class SeparatedEncoder(WalkedEncoder):
         payload, lines = self.message.payload, list[str]()
         for step in text_steps(payload):
             lines += self._text(step)
-        texts = [*(['b""'] if payload.leading else []), *(f"{step.name}_text" for step in payload.steps)]
+        empty = skipped(payload)
+        texts = ['b""'] if payload.leading else []
+        texts += (f"*{step.name}_texts" if step is empty else f"{step.name}_text" for step in payload.steps)
         separator, least = literal(payload.separator), max(1, needed_steps(payload) + payload.leading)
         if len(texts) == 1:
             return [*lines, f"data = {texts[0]}", *self._framed(name)]
@@ -101,8 +105,10 @@ class SeparatedEncoder(WalkedEncoder):
 
     def _joined(self, step: ItemsStep) -> str:
         self._use_text(step.item)
-        text = integers.to_bytes(step.item, "item")
-        return f"{step.name}_text = {literal(step.between)}.join([{text} for item in {step.name}_raw])"
+        texts = f"[{integers.to_bytes(step.item, 'item')} for item in {step.name}_raw]"
+        if step is skipped(self.message.payload):
+            return f"{step.name}_texts = {texts}"
+        return f"{step.name}_text = {literal(step.between)}.join({texts})"
 
 
 @dataclass
@@ -133,14 +139,15 @@ class SeparatedDecoder(WalkedDecoder):
         if not lists:
             names = [f"{step.name}_text" for step in steps]
             lines += assigned_targets(names, "texts[1:]" if payload.leading else "texts")
-        index = int(payload.leading)
+        index, after = int(payload.leading), texts_behind(payload)
         for step in steps:
             if isinstance(step, ItemsStep):
                 lines += self._items_between(step, index)
             else:
                 lines += [f"{step.name}_text = texts[{index}]"] if lists else []
-                lines += self._text(step, f"{place.use('start_of')}(texts, {index})" if index else "0")
-            index += greatest_texts(step)
+                lines += self._text(step, self._text_start(index) if index else "0")
+            # Behind an open list, texts are counted from the last one.
+            index = -after if step is opened else index + greatest_texts(step)
         at, behind = Size(), self._needed_back()
         if behind:
             lines.append(f"at = len({place.data}) - {place.trailer}")
@@ -150,17 +157,23 @@ class SeparatedDecoder(WalkedDecoder):
             at += part.size
         return [*lines, *header, *self._flushed(), *self._absent(), "return message"]
 
+    def _text_start(self, index: int, more: str = "") -> str:
+        """The offset of a text, which is counted from the last one if the index is negative."""
+        counted = f"{index}" if index >= 0 else f"len(texts) - {-index}"
+        return f"{self.place.use('start_of')}(texts, {counted}{more})"
+
     def _items_between(self, step: ItemsStep, start: int) -> list[str]:
         """Statements that decode a list, item by item."""
         local, target = f"{step.name}_texts", f"message.{attribute(step.name)}"
-        stop = f"{start + step.length.maximum}" if step.fixed else ""
-        head = [f"{local} = texts[{start or ''}:{stop}]"]
-        if not step.length.minimum:
+        behind = texts_behind(self.message.payload)
+        stop = start + step.length.maximum if step.fixed else -behind
+        head = [f"{local} = texts[{start or ''}:{stop or ''}]"]
+        if not step.length.minimum and not behind:
             head += [f'if {local} == [b""]:', f"    {local} = []"]
         text, raw = f"{step.name}_text", f"{step.name}_raw"
         least, most = characters(step)
         self._values.append(f"{raw} = {self._number_in(step.item, text)}")
-        at = f"{self.place.use('start_of')}(texts, {start} + at)"
+        at = self._text_start(start, " + at")
         name = attribute(step.name)
         self._refuse(f"{raw} > {step.item.maximum}", name, text, at)
         for rule in step.conditions:

@@ -591,7 +591,7 @@ class FieldMaker:
                 made[self.words.name(taken)] = spec
                 room.left -= size + 1
         self._opened(made)
-        return self._with_real(made, room, taken)
+        return self._opened_before(self._with_real(made, room, taken))
 
     def _with_real(self, made: Doc, room: Room, taken: set[str]) -> Doc:
         """Perhaps one more field, of a floating-point number."""
@@ -616,6 +616,23 @@ class FieldMaker:
         name, _, number = last["type"].partition("[")
         if number and name != "text" and self.rng.random() < 0.7:
             last["type"] = f"{name}[{self.rng.choice((0, 0, 1))}..{number}"
+
+    def _opened_before(self, made: Doc) -> Doc:
+        """A list before fields that are always there may have fewer items, if no other one has."""
+        # Drawn from another source: the schemas of earlier seeds stay what they are.
+        rng, names = random.Random(repr(self.rng.getstate())), list(made)
+        if not names or ".." in made[names[-1]]["type"].replace("text", "") or rng.random() < 0.3:
+            return made
+        lists = [name for name in names[:-1] if made[name]["type"].endswith("]")]
+        lists = [name for name in lists if not made[name]["type"].startswith("text")]
+        if not lists:
+            return made
+        chosen = rng.choice(lists)
+        for name in names[names.index(chosen) + 1 :]:
+            made[name].pop("optional", None)
+        name, _, number = made[chosen]["type"].partition("[")
+        made[chosen]["type"] = f"{name}[{rng.choice((0, 0, 1))}..{number}"
+        return made
 
     def _dated(self, made: list[tuple[str, Any]], taken: set[str]) -> list[tuple[str, Any]]:
         """Some fields begin with a version of the protocol, and others have ended before the newest one."""

@@ -105,9 +105,8 @@ def _check_barred(message: Message, values: Mapping[str, Raw]) -> None:
 
 def _texts(message: Message, values: Mapping[str, Raw]) -> bytes:
     """The texts of the fields; absent ones at the end are left out."""
-    data, seen = b"", False
-    for index in reversed(range(len(message.slots))):
-        slot = message.slots[index]
+    texts, seen = list[bytes](), False
+    for slot in reversed(message.slots):
         if slot.optional and values[slot.name] is None:
             text = b""
         elif isinstance(slot.kind, Run) and slot.kind.item:
@@ -117,15 +116,19 @@ def _texts(message: Message, values: Mapping[str, Raw]) -> bytes:
                 raise Wrong("range", f"{len(given)} items")
             numbers = [_number(slot.kind.item, each) for each in given]
             text = message.separator.join(_put(slot.kind.item, each) for each in numbers)
-            seen = seen or bool(given)
+            if not given:  # a list without items has no text
+                continue
+            seen = True
         else:
             text = _encoded(message.slots, slot, values)
             seen = True
             if isinstance(slot.kind, Run) and any(each in message.barred for each in text):
                 raise Wrong("range", slot.name)
         if seen:
-            data = (message.separator if index or message.leading else b"") + text + data
-    return data
+            texts.append(text)
+    if texts and message.leading:
+        texts.append(b"")
+    return message.separator.join(reversed(texts))
 
 
 def _between(message: Message, payload: bytes) -> dict[str, Raw]:
@@ -139,11 +142,14 @@ def _between(message: Message, payload: bytes) -> dict[str, Raw]:
     if not max(least, 0 if message.leading else 1) <= len(texts) <= most:
         raise Wrong("length", f"{len(texts)} texts")
     values: dict[str, Raw] = {}
-    for slot in message.slots:
+    for index, slot in enumerate(message.slots):
         kind = slot.kind
         if isinstance(kind, Run) and kind.item:
-            own, texts = texts[: kind.most], texts[kind.most :]
-            values[slot.name] = [] if own == [b""] and not kind.low else _list(slot, kind.item, own)
+            after = sum(each.texts[0] for each in message.slots[index + 1 :]) if kind.low < kind.most else 0
+            number = len(texts) - after if after else kind.most
+            own, texts = texts[:number], texts[number:]
+            none = own == [b""] and not kind.low and not after
+            values[slot.name] = [] if none else _list(slot, kind.item, own)
             continue
         text, texts = (texts or [b""])[0], texts[1:]
         if slot.optional and not text:
