@@ -24,6 +24,28 @@ from tests.support.agreement import compare, events, kind, wire
 from tests.support.cdriver import Driver, build, raw_text
 from tests.support.random_raw import damaged, random_address, random_values
 
+#: Texts that end with a byte in a frame without a length: bytes before them have a count.
+LABELS = """\
+qlinkgen: 1
+protocol: {name: labels, title: Labels, revision: "1", source: this test, doc: Texts that end with a byte.}
+frame:
+  parts:
+    code: {role: message, type: u8}
+    data: {role: payload, size: 0..60}
+    sum: {type: u8, algorithm: sum8, over: [code, data]}
+bus: {kind: master_slave}
+defaults: {repeat: safe}
+commands:
+  label:
+    id: 1
+    request:
+      many: {type: u8, counts: data}
+      data: "bytes[0..8]"
+      name: {type: "text[0..8]", terminator: 00}
+      place: u16
+      note: {type: "text[1..8]", terminator: 00}
+    response: none
+"""
 ROUNDS = 40
 CASES = [
     (name, direction)
@@ -104,6 +126,21 @@ def test_no_receiver_waits_for_the_byte_after_a_stuffed_end(
         for stream in streams:
             said = driver.ask("stream", "request", stream.hex()).split()[1:]
             assert said == events(plan, "request", stream), stream.hex()
+
+
+def test_a_receiver_waits_for_ends_beyond_the_received_bytes(
+    shared: Path, require_tool: Callable[..., str]
+) -> None:
+    protocol, _ = loads(LABELS, "labels.yaml")
+    assert protocol
+    plan = plan_of(protocol)
+    frame = Codec(plan).encode("label", {"data": b"abc", "name": b"de", "place": 7, "note": b"fgh"})
+    cut = [kind(plan, "request", frame[:end]) for end in range(len(frame) + 1)]
+    assert cut[1:] == ["truncated"] * (len(frame) - 1) + ["intact"]
+    with Driver(build(protocol, shared / "shapes", require_tool("gcc", package="gcc"), SANITIZED)) as driver:
+        assert driver.ask("cuts", "request", frame.hex()).split()[1:] == cut
+        said = driver.ask("stream", "request", (frame + frame).hex()).split()[1:]
+        assert said == events(plan, "request", frame + frame)
 
 
 @pytest.mark.parametrize(("name", "direction"), CASES)
