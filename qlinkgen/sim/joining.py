@@ -67,17 +67,44 @@ def join(
     speed = codec.BUS.baud or USUAL_SPEED
     paced = transport == "virtual"
     wire = Wire(baud=speed if paced else None, bits_per_byte=codec.BUS.bits_per_byte, faults=faults)
+    with (
+        _port(wire, transport, speed) as port,
+        join_at(port, wire, master, *handlers, turnaround=turnaround, own=own, **options) as joined,
+    ):
+        yield joined
+
+
+@contextlib.contextmanager
+def join_at(
+    port: Port,
+    wire: Wire,
+    master: type[M],
+    *handlers: Node,
+    turnaround: float = 0.0,
+    own: Node | None = None,
+    **options: Any,  # of the class, which checks them
+) -> Iterator[Joined[M]]:
+    """Join a master at a port with slaves on its line during a block, and close the master afterwards.
+
+    Args:
+        port: the port of the master; closing the master closes it.
+        wire: the line, without stations.
+        master: as for `join`, like the rest.
+        handlers: see there.
+        turnaround: see there.
+        own: see there.
+        options: see there.
+    """
+    codec = master.codec
     nodes = handlers or (_usual(codec),)
     both = issubclass(master, blocking.Link | aio.AsyncLink)
-    with contextlib.ExitStack() as stack:
-        port = stack.enter_context(_port(wire, transport, speed))
-        others = tuple(_engine(codec, port, each, turnaround, both=both) for each in nodes)
-        for engine in others:
-            wire.attach(engine)
-        given = (own or _usual(codec),) if both else ()
-        make: Any = master  # its arguments depend on the kind
-        made: M = make(port, *given, **options)
-        stack.callback(made.close)
+    others = tuple(_engine(codec, port, each, turnaround, both=both) for each in nodes)
+    for engine in others:
+        wire.attach(engine)
+    given = (own or _usual(codec),) if both else ()
+    make: Any = master  # its arguments depend on the kind
+    made: M = make(port, *given, **options)
+    with contextlib.closing(made):
         yield Joined(made, others, wire)
 
 
