@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import random
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from enum import IntEnum
+from typing import Any
 
 from qlinkgen.link.codec import Command, Module, OtherReply
 from qlinkgen.model.spelling import similar
@@ -52,6 +55,21 @@ def _refusing(command: Command) -> tuple[OtherReply, Mapping[str, object]]:
         for first, _, means in reply.cases:
             if means == "refused":
                 return reply, {reply.switch: first}
-        if reply.means == "refused" and not any(first <= 0 <= last for first, last, _ in reply.cases):
-            return reply, {}
+        if reply.means == "refused":
+            if not reply.switch:
+                return reply, {}
+            for number in _others(reply):
+                return reply, {reply.switch: number}
     raise SimulationError(f"{command.name} cannot be refused: none of its replies means refused")
+
+
+def _others(reply: OtherReply) -> Iterator[int]:
+    """Legal numbers of the switch of a reply beside its cases, those with a name first."""
+    kind: Any = reply.message  # which has a rule for each field
+    rule = next(rule for rule in kind.RULES if rule.name == reply.switch)
+    usual = inspect.signature(kind).parameters[reply.switch].default
+    named = [int(each) for each in type(usual)] if isinstance(usual, IntEnum) else []
+    ends = {first for first, _ in rule.ranges} | {last + 1 for _, last, _ in reply.cases}
+    for number in (*named, *sorted(ends)):
+        if rule.allows(number) and not any(first <= number <= last for first, last, _ in reply.cases):
+            yield number
