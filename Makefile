@@ -71,10 +71,11 @@ bench: .venv/.user  ## Measure the generated code beside its peers
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps $(CRSF)
 	@$(BIN)/python benchmarks/run.py
 
-soak: .venv/.user  ## A million transactions on a bad line, 50 000 over a pty, 20 000 with each firmware, 500 000 of other protocols; writes docs/soak.md (45 minutes)
+soak: .venv/.user  ## A million transactions on a bad line, 50 000 over a pty, 20 000 with each firmware, 500 000 of other protocols, and the behaviours of every bus over a pty; writes docs/soak.md (45 minutes)
 	@$(BIN)/python -m tests.soak.bus --output docs/soak.md
 	@$(BIN)/python -m tests.soak.firmware --output docs/soak.md
 	@$(BIN)/python -m tests.soak.buses
+	@QLINKGEN_PTYS=all $(BIN)/python -m pytest tests/bus -k behaviour -m pty
 
 soak-schemas: .venv/.dev  ## 1 000 random whole schemas through every target, gcc and clang; writes docs/soak-schemas.md (40 minutes)
 	@$(BIN)/python -m tests.whole --seeds 1..1000 --every --report build/soak-schemas.txt --output docs/soak-schemas.md

@@ -14,7 +14,7 @@ from qlinkgen.backends import python
 from qlinkgen.backends.base import Options
 from qlinkgen.backends.python import bus
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.schema import library, loads
+from qlinkgen.schema import loads
 from tests.library.protocols import described
 
 #: Package of the modules.
@@ -22,15 +22,9 @@ PACKAGE = "wire_of_buses"
 
 
 @functools.cache
-def driven() -> list[str]:
-    """Protocols of the library with transactions."""
-    return [name for name in library() if described(name).model.commands]
-
-
-@functools.cache
 def _folder() -> Path:
     folder = tempfile.TemporaryDirectory(prefix="buses-")
-    weakref.finalize(driven, folder.cleanup)
+    weakref.finalize(write, folder.cleanup)
     sys.path.insert(0, folder.name)
     return Path(folder.name)
 
@@ -69,3 +63,11 @@ def _imported(protocol: Protocol) -> Any:
     write(protocol, _folder())
     importlib.invalidate_caches()
     return importlib.import_module(f"{PACKAGE}.{protocol.name}_bus")
+
+
+def asker(name: str, prefix: str = "") -> Any:
+    """The class of a protocol that asks."""
+    module = bus_of(name)
+    return next(
+        getattr(module, prefix + each) for each in ("Bus", "Device", "Peer") if hasattr(module, prefix + each)
+    )
