@@ -67,6 +67,11 @@ BELONGS: Belongs = {
 @click.option("--seconds", "length", callback=seconds, metavar="SECONDS", help="End a ring after this time.")
 @click.option("--link", type=click.Path(), metavar="PATH", help="Create a symbolic link to the port.")
 @click.option(
+    "--listen",
+    metavar="tcp:PORT",
+    help="Listen on a TCP port in place of a pty, 0 for a free one; tcp:HOST:PORT, 127.0.0.1 by default.",
+)
+@click.option(
     "--tap",
     type=click.Path(),
     metavar="PATH",
@@ -98,6 +103,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     closed: bool,
     length: float | None,
     link: str | None,
+    listen: str | None,
     tap: str | None,
     traced: bool,
     record: str | None,
@@ -107,7 +113,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     echo: bool,
     crc: str | None,
 ) -> None:
-    """Simulate nodes on a new port (a pty) until Ctrl-C or SIGTERM.
+    """Simulate nodes on a new port (a pty, or TCP) until Ctrl-C or SIGTERM.
 
     The first line on standard output is {"port": "/dev/pts/N"}, once the port is ready. All other output goes
     to standard error, including a final summary of requests, responses and faults.
@@ -133,6 +139,7 @@ def command(  # noqa: PLR0917  # click passes them by name
 
     \b
     qlinkgen simulate qlink --nodes 1-16 --link /tmp/qlink
+    qlinkgen simulate qlink --listen tcp:5000
     qlinkgen simulate qlink --nodes 1,3 --baud 115200 --faults drop=0.02,flip=0.01 --seed 7
     qlinkgen simulate thermostat.yaml --nodes 1-4 --value get_zones.temperatures=250,251
     qlinkgen simulate trio --ring coordinator,keypad,coordinator --link /tmp/ring
@@ -147,6 +154,7 @@ def command(  # noqa: PLR0917  # click passes them by name
         simulate_ring(
             ring,
             link=link,
+            listen=listen,
             baud=baud,
             plan=plan,
             crc=crc,
@@ -159,7 +167,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     elif kind is HOST:
         from qlinkgen.cli.simulate_host import simulate_host  # noqa: PLC0415
 
-        simulate_host(link=link, baud=baud, plan=plan, record=record)
+        simulate_host(link=link, listen=listen, baud=baud, plan=plan, record=record)
     else:
         from qlinkgen.cli.behaviour import Behaviour  # noqa: PLC0415
         from qlinkgen.cli.simulate_bus import simulate_bus  # noqa: PLC0415
@@ -169,6 +177,7 @@ def command(  # noqa: PLR0917  # click passes them by name
             protocol,
             nodes,
             link=link,
+            listen=listen,
             baud=baud,
             plan=plan,
             echo=echo,

@@ -10,7 +10,7 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import load_protocol
 from qlinkgen.cli.kinds import is_shipped
-from qlinkgen.cli.simulating import run_bus, say, watch_line
+from qlinkgen.cli.simulating import port_of, run_bus, say, watch_line
 from qlinkgen.cli.wire_options import ANY_SPEED, counted, parse_nodes, with_crc
 from qlinkgen.link.codec import Codec, Framed
 from qlinkgen.link.slave import Node, SlaveEngine
@@ -36,6 +36,7 @@ def simulate_bus(
     tap: str | None = None,
     traced: bool = False,
     record: str | None = None,
+    listen: str | None = None,
 ) -> None:
     """Run the nodes on a pty until a signal."""
     from qlinkgen.sim.pty_bus import PtyBus  # noqa: PLC0415  # needs a system that has ptys
@@ -61,7 +62,7 @@ def simulate_bus(
             loaded = load_protocol(protocol, crc)
             name = link or f"simulated {loaded.name}"
             watch_line(wire, loaded, load_codec(loaded), name, ended, traced=traced, record=record)
-        run_bus(PtyBus(wire, link=link), link, what)
+        run_bus(PtyBus(wire, link=link, port=port_of(listen, link, baud)), link, what)
     say(_summary(engines), plan)
 
 

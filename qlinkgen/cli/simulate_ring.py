@@ -13,7 +13,7 @@ from qlinkgen.cli.boundary import WRONG, Failure
 from qlinkgen.cli.common import load_protocol
 from qlinkgen.cli.ring_console import Console
 from qlinkgen.cli.ring_programs import programs_of, run_closed, run_open, scripts_of
-from qlinkgen.cli.simulating import ring_tap, run_bus, say
+from qlinkgen.cli.simulating import port_of, ring_tap, run_bus, say
 from qlinkgen.cli.wire_options import counted, with_crc
 from qlinkgen.link.ring import RingCodec, RingNode
 from qlinkgen.protocols.trio.basic import ProgrammedNode
@@ -34,6 +34,7 @@ def simulate_ring(
     ring: str | None,
     *,
     link: str | None,
+    listen: str | None = None,
     baud: int | None,
     plan: FaultPlan | None,
     crc: str | None,
@@ -50,6 +51,8 @@ def simulate_ring(
         raise Failure(f"--faults to={plan.to}: a ring has neither master nor slaves; omit to={plan.to}")
     if closed and link is not None:
         raise Failure(f"--link {link}: a closed ring has no port; omit --closed or --link")
+    if closed and listen is not None:
+        raise Failure(f"--listen {listen}: a closed ring has no port; omit --closed or --listen")
     codec: RingCodec = with_crc(trio, trio.Codec, crc)
     given = RING if ring is None else ring
     kinds = [kind.strip() for kind in given.split(",")]
@@ -69,7 +72,7 @@ def simulate_ring(
             made = (
                 VirtualRing(places, baud=baud, faults=plan, taps=taps, codec=codec)
                 if closed
-                else _with_port(places, link, baud, plan, codec)
+                else _with_port(places, link=link, listen=listen, baud=baud, plan=plan, codec=codec)
             )
         except SimulationError as error:
             raise Failure(f"--ring {given}: {error}") from None
@@ -91,14 +94,22 @@ def simulate_ring(
 
 def _with_port(
     places: Sequence[str | Node],
+    *,
     link: str | None,
+    listen: str | None,
     baud: int | None,
     plan: FaultPlan | None,
     codec: RingCodec,
 ) -> RingBus:
     from qlinkgen.sim.port_ring import ring_bus  # noqa: PLC0415  # needs a system that has ptys
 
-    return ring_bus(places, link=link, baud=baud, faults=plan, codec=codec)
+    with ExitStack() as opened:  # closes the port if the ring cannot be made
+        port = port_of(listen, link, baud)
+        if port is not None:
+            opened.callback(port.close)
+        made = ring_bus(places, link=link, port=port, baud=baud, faults=plan, codec=codec)
+        opened.pop_all()
+        return made
 
 
 def _account(node: Node) -> str:

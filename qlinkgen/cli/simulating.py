@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from types import ModuleType
@@ -16,11 +18,17 @@ from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.cli.tracing import FibreTrace, LineTrace, Printer, Tell, Trace, keep
 from qlinkgen.cli.wire_options import ANY_SPEED, counted
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.values import whole_number
 from qlinkgen.sim import OUTSIDE, FaultPlan, FaultPlanError, Wire
 from qlinkgen.sim.wire import Tap
+from qlinkgen.transport.listening import ListeningPort
 
 if TYPE_CHECKING:
     from qlinkgen.sim.pty_bus import PtyBus
+
+
+#: A host in brackets is an address of IPv6.
+_LISTEN = re.compile(r"tcp:((?P<host>\[[^\]]+\]|[^:\[\]]+):)?(?P<port>[0-9]{1,5})")
 
 
 def plan_of(text: str | None, seed: int | None) -> FaultPlan | None:
@@ -79,6 +87,24 @@ def ring_tap(
         fibres[source].hear(at, True, data)
 
     return tap
+
+
+def port_of(listen: str | None, link: str | None, baud: int | None) -> ListeningPort | None:
+    """Return the port of ``--listen``, None for a pty."""
+    if listen is None:
+        if sys.platform == "win32":
+            raise Failure("this system has no ptys; add --listen tcp:0, and pass the URL that is printed")
+        return None
+    if link is not None:
+        raise Failure(f"--link {link}: a TCP port has no link; omit --link or --listen")
+    found = _LISTEN.fullmatch(listen)
+    number = whole_number(found["port"]) if found else None
+    if found is None or number is None or number > 65535:
+        raise Failure(
+            f"--listen {listen}: write tcp:PORT or tcp:HOST:PORT with a port of 0..65535, 0 for a free one"
+        )
+    host = found["host"] or "127.0.0.1"
+    return ListeningPort(host.strip("[]"), number, baud=baud or ANY_SPEED)
 
 
 def run_bus(bus: PtyBus, link: str | None, what: str) -> None:

@@ -142,9 +142,11 @@ class RingBus(PtyBus):
         nodes: the simulated nodes, in the order of the ring.
     """
 
-    def __init__(self, wire: RingWire, nodes: Sequence[Node], link: str | os.PathLike[str] | None) -> None:
+    def __init__(
+        self, wire: RingWire, nodes: Sequence[Node], link: str | os.PathLike[str] | None, port: Port | None
+    ) -> None:
         """Use `ring_bus`."""
-        super().__init__(wire, link=link)
+        super().__init__(wire, link=link, port=port)
         self.nodes = list(nodes)
 
     def __enter__(self) -> Self:
@@ -155,6 +157,7 @@ def ring_bus(
     ring: str | Iterable[str | Node],
     *,
     link: str | os.PathLike[str] | None = None,
+    port: Port | None = None,
     baud: int | None = None,
     faults: Faults = None,
     **options: Unpack[RingOptions],
@@ -166,6 +169,7 @@ def ring_bus(
     Args:
         ring: kinds such as "coordinator,keypad,coordinator", or nodes, at most 14.
         link: path of a symbolic link to the pty, so that its name is known beforehand.
+        port: use this port instead of a new pty.
         baud: bits per second, or None for an unpaced ring.
         faults: a plan for all hops, or plans by the number of the node before the hop; the outside has the
             last number.
@@ -180,4 +184,4 @@ def ring_bus(
     wire = RingWire(trio, baud=baud, faults=faults)
     for number, node in enumerate(nodes):
         wire.attach(engine_of(node), f"node {number}")
-    return RingBus(wire, nodes, link)
+    return RingBus(wire, nodes, link, port)

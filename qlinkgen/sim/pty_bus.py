@@ -15,6 +15,7 @@ from qlinkgen.sim.errors import SimulationError
 from qlinkgen.sim.wire import Wire
 from qlinkgen.transport.forking import tell_of_forks
 from qlinkgen.transport.handing_over import HandOver
+from qlinkgen.transport.listening import ListeningPort
 from qlinkgen.transport.port import Port
 from qlinkgen.transport.pty import open_pty
 from qlinkgen.transport.waker import Waker
@@ -49,7 +50,7 @@ class PtyBus:
         Args:
             wire: the line, with its stations.
             link: path of a symbolic link to the slave end, so that its name is known beforehand.
-            port: use this port instead of a new pty, such as a real adapter; it must have a descriptor.
+            port: use this port instead of a new pty: an adapter or `ListeningPort`, with a descriptor.
 
         Raises:
             PortError: the link cannot be made.
@@ -66,6 +67,8 @@ class PtyBus:
             )
         self._waker = Waker()
         self._look = make_looker(descriptor, self._waker.descriptor)
+        if isinstance(self.port, ListeningPort):
+            self._look = self._look_at_clients
         self._running = threading.RLock()
         self._calls: deque[Callable[[], object]] = deque()
         self._stopping = False
@@ -114,6 +117,11 @@ class PtyBus:
             if clock() >= due:
                 return False
         return True
+
+    def _look_at_clients(self, seconds: float | None) -> bool:
+        """Wait on a port whose descriptor changes."""
+        watched = [each for each in (self.port.fileno(), self._waker.descriptor) if each is not None]
+        return bool(select.select(watched, (), (), seconds)[0])
 
     def _answer_calls(self) -> None:
         self._waker.clear()

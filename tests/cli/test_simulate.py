@@ -262,3 +262,47 @@ def test_nowhere_to_say_the_port(tmp_path: Path) -> None:
     assert done.returncode == 1
     assert "No space left on device" in done.stderr
     assert not os.path.lexists(link)
+
+
+@pytest.mark.parametrize(
+    ("protocol", "words", "reply"),
+    [
+        ("qlink", ("motor_position", "--node", "1", "--echo", "none"), "motor_position.response"),
+        ("mc1231a", ("get_vel", "--axis", "2"), "get_vel.response"),
+        ("modbus_rtu", ("read_exception_status", "--node", "1"), "read_exception_status.response"),
+    ],
+)
+def test_a_port_of_tcp(protocol: str, words: tuple[str, ...], reply: str, qlinkgen: Run) -> None:
+    with simulated(protocol, "--listen", "tcp:0") as (url, process):
+        assert url.startswith("socket://127.0.0.1:")
+        for _ in range(2):  # one master after the other
+            done = qlinkgen("send", protocol, url, *words, *SLACK)
+            assert [each["message"] for each in objects(done.out)] == [reply]
+        code, _, err = end(process, signal.SIGTERM)
+    assert code == 0
+    assert f" on {url}; press Ctrl-C to stop" in err
+
+
+def test_a_ring_on_a_port_of_tcp(qlinkgen: Run) -> None:
+    with simulated("trio", "--listen", "tcp:localhost:0") as (url, process):
+        sent = ("direct_variable_transfer", "--address", "1", "number=7", "value=-0.25")
+        assert qlinkgen("send", "trio", url, *sent).code == 0
+        _, _, err = end(process, signal.SIGTERM)
+    assert url.startswith("socket://localhost:")
+    assert "VR(7) = -0.25" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("qlink", "--listen", "5000"), "--listen 5000: write tcp:PORT or tcp:HOST:PORT"),
+        (("qlink", "--listen", "tcp:65536"), "--listen tcp:65536: write tcp:PORT or"),
+        (("qlink", "--listen", "tcp:0", "--link", "bus"), "--link bus: a TCP port has no link"),
+        (("trio", "--listen", "tcp:0", "--closed"), "--listen tcp:0: a closed ring has no port"),
+        (("qlink", "--listen", "tcp:192.0.2.1:0"), "cannot listen on socket://192.0.2.1:0"),
+    ],
+)
+def test_wrong_addresses(words: tuple[str, ...], text: str, qlinkgen: Run) -> None:
+    result = qlinkgen("simulate", *words)
+    assert result.code in {1, 2}
+    assert text in result.err
