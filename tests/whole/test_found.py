@@ -10,6 +10,7 @@ from qlinkgen.backends import construct, python
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.dissect import dissect
 from qlinkgen.schema import loads
+from tests.support.whole.reference import Reference, Wrong
 from tests.support.whole.trial import Effort, run_text
 
 _HEAD = """\
@@ -314,3 +315,29 @@ def test_a_message_without_its_last_zeros_may_fix_a_value_of_its_frame() -> None
     wire = python.load(protocol).Log(level=0x01000000).to_frame()
     assert wire.hex() == "7e0105010101"
     assert frames.parse(wire)["on"] == 1
+
+
+def test_an_id_in_the_payload_is_looked_up_after_the_check_value() -> None:
+    """Of frames without a leading constant; only ids and addresses before the payload are checked first."""
+    text = f"""{_HEAD}frame:
+  parts:
+    node: {{role: source, type: u8}}
+    code: {{role: message, type: "text[2..4]"}}
+    data: {{role: payload, size: 0..4}}
+    sum: {{type: u8, algorithm: sum8, over: [node, code, data]}}
+    to: {{role: destination, type: u8}}
+    end: {{role: terminator, value: "0D"}}
+  coding: {{escape: 7D, xor: 20, of: [0D, 7D]}}
+bus: {{kind: master_slave, nodes: 1..8, master: 9}}
+messages: {{log: {{id: GO, direction: request, fields: {{}}}}}}
+"""
+    protocol, faults = loads(text, "whole.yaml")
+    assert protocol, faults
+    wire = bytes.fromhex("09 67 4F 00 05 0D")
+    codec = python.load(protocol)
+    with pytest.raises(codec.DecodeError) as caught:
+        codec.decode_request(wire)
+    with pytest.raises(Wrong) as wrong:
+        Reference(text).decode("request", wire)
+    assert (caught.value.kind, wrong.value.kind) == ("crc", "crc")
+    assert dissect(plan_of(protocol), wire, "request").kind == "crc"

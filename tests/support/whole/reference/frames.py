@@ -786,7 +786,8 @@ class Splitter:
                 raise Refused("length", cursor.at)
         if part.role in ("bits", "derived") and frame.has(part, cut) and frame.wrong(part, cut):
             raise Refused("frame", cursor.at, told=frame.terminator is not None)
-        if frame.bare and any(role not in ("constant", "value") for role, *_ in part.bits):
+        header = frame.parts.index(part) < frame.payload_at
+        if frame.bare and header and any(role not in ("constant", "value") for role, *_ in part.bits):
             number, address = frame.number("message", cut), frame.number("address", cut)
             if number is None:
                 return
