@@ -541,6 +541,9 @@ def _measure_walked(plan: PayloadPlan, start: bytes) -> int:
     try:
         size = walk.measure(plan, start)
     except Missing as missing:
+        if missing.end > plan.most:
+            # A receiver has no room for the bytes that would decide.
+            raise BadContent("length") from None
         raise MoreNeeded(max(plan.least, missing.end), missing.end) from None
     except Wrong as wrong:
         raise BadContent("length", wrong.path, wrong.at) from None

@@ -9,6 +9,7 @@ import pytest
 from qlinkgen.backends import construct, python
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.dissect import dissect
+from qlinkgen.plan.receive import receiver
 from qlinkgen.schema import loads
 from tests.support.whole.reference import Reference, Wrong
 from tests.support.whole.trial import Effort, run_text
@@ -230,6 +231,45 @@ commands:
     "defaults: {addressing: node, repeat: safe}\n"
     "commands:\n  get: {id: 5, request: {}, response: {v: u8}}\n"
     "  put: {id: 6, request: {v: u8}, response: {}}\n",
+    "counts of records beyond what a frame holds, for whose bytes C had no room and heard nothing more": """\
+frame:
+  parts:
+    code: {role: message, type: u8}
+    data: {role: payload, size: 0..8}
+    crc: {type: u8, algorithm: sum8, over: [code, data]}
+bus: {kind: master_slave}
+types: {item: {fields: {n: {type: u8, counts: v}, v: "u8[0..3]"}}}
+messages:
+  log:
+    id: 5
+    fields:
+      size: {type: u8, counts: items, counts_in: bytes}
+      number: {type: u8, counts: items}
+      items: "item[0..4]"
+      x: u32
+      m: {type: u8, counts: b}
+      b: "u8[0..3]"
+""",
+    "a check value of some frames of the first kind, which C took for the main one": """\
+frames:
+  long:
+    parts:
+      start: A5
+      code: {role: message, type: u8}
+      length: {type: u8, counts: [data]}
+      state: {type: u8, bits: {on: 0}}
+      data: {role: payload, size: 0..9}
+      crc: {type: u16, algorithm: fletcher-8, over: [code, data], if: state.on}
+  short:
+    parts:
+      start: 24 58
+      code: {role: message, type: u8}
+      sum: {type: u8, algorithm: sum8, over: [code]}
+bus: {kind: master_slave}
+messages:
+  log: {id: 5, frame: long, fields: {v: u8}}
+  state: {id: 6, frame: short, fields: {}}
+""",
     "records of variable size in records, whose sizes in C had one name": _PARTS
     + _BUS
     + 'types: {leaf: {fields: {n: u8, x: "u8[n]"}}, pair: {fields: {a: leaf, b: leaf}}}\n'
@@ -341,3 +381,16 @@ messages: {{log: {{id: GO, direction: request, fields: {{}}}}}}
         Reference(text).decode("request", wire)
     assert (caught.value.kind, wrong.value.kind) == ("crc", "crc")
     assert dissect(plan_of(protocol), wire, "request").kind == "crc"
+
+
+def test_records_end_where_a_count_lies_beyond_the_longest_payload() -> None:
+    """At once: the bytes of the records, announced as 3 of at most 1, are not waited for."""
+    text = _HEAD + next(each for key, each in FOUND.items() if key.startswith("counts of records beyond"))
+    protocol, faults = loads(text, "whole.yaml")
+    assert protocol, faults
+    codec = python.load(protocol)
+    log = codec.Log(x=7)
+    assert codec.StreamDecoder().feed(bytes((5, 3, 3)) + log.to_frame())[-1:] == [log]
+    heard = receiver(plan_of(protocol), "message")
+    events = [event for byte in bytes((5, 3, 3)) + log.to_frame() for event in heard.feed(byte)]
+    assert events[-1].decoded

@@ -124,6 +124,7 @@ class _Sizer:
             "}",
             *refusal([f"{count} > {most}U"], f"{upper}_ERROR_LENGTH"),
             f"if ((at + {count}) >= available) {{",
+            *_indented(self._too_long(f"(at + {count}) >=")),
             "    *size = (*size > available) ? *size : (available + 1U);",
             f"    return {upper}_ERROR_TRUNCATED;",
             "}",
@@ -180,7 +181,9 @@ class _Sizer:
         if known or (not isinstance(step, CountStep) and not names & self._tested):
             return
         learner, front = self._learner, step.place.front.fixed
-        learner.refuse([f"available < (at + {front + step.integer.size}U)"], "TRUNCATED")
+        end = f"(at + {front + step.integer.size}U)"
+        learner.lines += self._too_long(f"{end} >")
+        learner.refuse([f"available < {end}"], "TRUNCATED")
         raw = self._peek(step.integer, front)
         if isinstance(step, ValueStep):
             self._assign(step.name, raw)
@@ -196,6 +199,13 @@ class _Sizer:
                 learner.take_sized(step, raw, Within(0, step.integer.mask))
             else:
                 learner.take(step, raw)
+
+    def _too_long(self, bytes_and_operator: str) -> list[str]:
+        """Refuse what no receiver has room for, where counts of records can add up to more."""
+        payload, upper = self._learner.payload, self._learner.layouts.prefix.upper()
+        if not any(segment.records for segment in payload.segments):
+            return []
+        return refusal([f"{bytes_and_operator} {payload.most}U"], f"{upper}_ERROR_LENGTH")
 
     def _peek(self, integer: Integer, front: int) -> str:
         return self._learner.layouts.peek(integer, "payload", f"at + {front}U" if front else "at")

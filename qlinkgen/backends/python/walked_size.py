@@ -37,7 +37,7 @@ def walked_measure_lines(payload: PayloadPlan) -> list[str]:
     ``read`` the end of the last number that decides: where a payload turns out to be too long.
     """
     bounded = any(segment.records for segment in payload.segments)
-    measure = _Measure(bounded=bounded)
+    measure = _Measure(payload.most if bounded else None)
     lines = measure.lines(payload.segments, ())
     if bounded:
         most = [f"if size > {payload.most}:", "    return -read"]
@@ -48,9 +48,9 @@ def walked_measure_lines(payload: PayloadPlan) -> list[str]:
 class _Measure:
     """Collects the statements, those of records inside of others with other locals."""
 
-    def __init__(self, *, bounded: bool, depth: int = 0) -> None:
-        """``bounded``: note the end of numbers that decide."""
-        self._bounded = bounded
+    def __init__(self, most: int | None, depth: int = 0) -> None:
+        """``most``: size of the payload that counts can exceed; the end of numbers that decide is noted."""
+        self._most = most
         self._depth = depth
 
     def lines(self, segments: Sequence[Segment], last: Sequence[Test]) -> list[str]:
@@ -97,9 +97,10 @@ class _Measure:
             "if end < 0:",
             f"    if len(data) > start + {most}:",
             f"        return -(start + {most + 1})",
+            *([f"    if len(data) - at >= {self._most}:", "        return -len(data)"] if self._most else []),
             "    return max(size, len(data) + 1 - at)",
             *([f"if end < start + {least}:", "    return -(end + 1)"] if least else []),
-            *(["read = end + 1"] if self._bounded else []),
+            *(["read = end + 1"] if self._most else []),
             f"size += end - start{f' - {least}' if least else ''}",
             "start = end + 1",
         ]
@@ -109,14 +110,14 @@ class _Measure:
         own, suffix = step.record.payload, nested(self._depth + 1)
         if isinstance(step, RecordStep):
             more = [] if present else [f"size += {own.least}"]
-            inner = _Measure(bounded=True, depth=self._depth + 1)
+            inner = _Measure(self._most, self._depth + 1)
             return [*more, *inner.lines(renamed(step.record.segments, suffix), ())]
         counted = step.length.minimum if present else 0
         if (step.name, True) in self._known:
             more = [f"size += {integers.bytes_of(step.name)} - {counted * own.least}"]
             return [*more, f"start += {integers.bytes_of(step.name)}"]
         last = renamed_tests(step.last, suffix)
-        inner = _Measure(bounded=True, depth=self._depth + 1)
+        inner = _Measure(self._most, self._depth + 1)
         lines = [f"size += {own.least}"]
         if counted:
             lines = [f"if index{suffix} >= {counted}:", f"    size += {own.least}"]
@@ -140,9 +141,12 @@ class _Measure:
             return f"start + {front + more}" if front + more else "start"
 
         end = at(step.integer.size)
+        if self._most:
+            yield f"if {end} - at > {self._most}:"
+            yield "    return -read"
         yield f"if len(data) < {end}:"
         yield "    return size"
-        if self._bounded:
+        if self._most:
             yield f"read = {end}"
         number = integers.read(step.integer, "data", at)
         if isinstance(step, ValueStep):

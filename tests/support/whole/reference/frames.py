@@ -828,10 +828,11 @@ class Splitter:
 
 def _measured(message: Message, take: Callable[[int], bytes], cursor: Cursor) -> bytes:
     """The bytes of a payload whose end follows from its counts."""
-    taker = _Taker(take)
+    most = message.sizes[1]
+    taker = _Taker(take, most)
     try:
-        size = _Measure(message.slots, taker, most=message.sizes[1]).run(0)
-        if size > message.sizes[1]:
+        size = _Measure(message.slots, taker, most=most).run(0)
+        if size > most:
             raise Wrong("length")
     except Wrong:
         raise Refused("length", cursor.at) from None
@@ -841,11 +842,13 @@ def _measured(message: Message, take: Callable[[int], bytes], cursor: Cursor) ->
 class _Taker:
     """Takes bytes of a payload as far as they decide."""
 
-    def __init__(self, take: Callable[[int], bytes]) -> None:
-        self._take, self._data = take, b""
+    def __init__(self, take: Callable[[int], bytes], most: int) -> None:
+        self._take, self._data, self._most = take, b"", most
 
     def upto(self, end: int) -> bytes:
-        """The bytes up to an offset."""
+        """The bytes up to an offset. Raises Wrong if no payload is as long."""
+        if end > self._most:
+            raise Wrong("length")
         self._data += self._take(max(0, end - len(self._data)))
         return self._data[:end]
 
