@@ -14,6 +14,7 @@ from qlinkgen.backends.c.names import storage
 from qlinkgen.model.checksum import SUMS, Algorithm, catalogue, find, stated
 from qlinkgen.schema import loads
 from tests.c.test_compile import header, run
+from tests.support.cdriver import Driver, build
 
 PROGRAM = """
 #include "qlink.h"
@@ -128,3 +129,38 @@ def test_sums_and_crcs_by_their_parameters(
     command = [compiler, *flags, str(tmp_path / "check.c"), "-o", str(tmp_path / "check")]
     subprocess.run(command, check=True, timeout=120)
     assert run(tmp_path / "check") == f"{algorithm.check:08x}"
+
+
+KINDS = """\
+qlinkgen: 1
+protocol: {name: tank, title: Tank, revision: "1", source: Example, doc: A tank}
+frames:
+  blocks:
+    parts:
+      start: 05 64
+      length: {type: u8, counts: data}
+      code: {role: message, type: u8}
+      data: {role: payload, size: 0..40}
+      sums: {type: u8, algorithm: sum8, over: [data], every: 16 bytes}
+  whole:
+    parts:
+      start: 55 FF
+      length: {type: u8, counts: data}
+      code: {role: message, type: u8}
+      data: {role: payload, size: 0..40}
+      crc: {type: u16, algorithm: crc-16/modbus, over: [length, code, data]}
+bus: {kind: master_slave}
+messages:
+  log: {frame: blocks, id: 1, direction: request, fields: {note: "bytes[0..40]"}}
+  state: {frame: whole, id: 2, direction: request, fields: {level: u16}}
+"""
+
+
+def test_the_main_algorithm_of_kinds_is_that_of_a_whole_frame(
+    tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    """It is the one with functions for programs, also where the first kind has values of blocks alone."""
+    protocol, faults = loads(KINDS, "tank.yaml")
+    assert protocol is not None, faults
+    with Driver(build(protocol, tmp_path, require_tool("gcc", package="gcc"))) as driver:
+        assert driver.ask("check", b"123456789".hex()) == f"ok {0x4B37}"
