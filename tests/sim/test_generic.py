@@ -133,6 +133,37 @@ def test_fields_that_repeated_values_decide() -> None:
     assert found["read"] == ["00", "010005", "020000", "0300"]
 
 
+BOUNDED = """\
+qlinkgen: 1
+protocol: {name: tags, title: Tags, revision: "1", source: Manual}
+frame:
+  parts:
+    code: {role: message, type: u8}
+    length: {type: u8, counts: [data]}
+    data: {role: payload, size: 0..60}
+bus: {kind: master_slave, response_within: 10 ms}
+defaults: {addressing: none, repeat: safe}
+types: {part: {fields: {kind: {type: u8, range: 1..9}, rest: {type: "bytes[0..8]", if: {kind: 1}}}}}
+commands:
+  name:
+    id: 1
+    request: {}
+    response: {name: {type: "text[1..8]", terminator: 20}, key: {type: "bytes[2..4]", terminator: 00}}
+  parts: {id: 2, request: {}, response: {parts: "part[0..4]"}}
+"""
+
+
+def test_smallest_values_leave_out_the_bytes_that_end_them() -> None:
+    protocol, faults = loads(BOUNDED, "tags.yaml")
+    assert protocol is not None, faults
+    codec = load(protocol)
+    node = GenericNode(codec, 0)
+    name, parts = (node.handle(each(), 0.0) for each in (codec.NameRequest, codec.PartsRequest))
+    assert name == codec.NameResponse(name="0", key=b"\x01\x01")
+    assert codec.NameResponse(name="0", key=b"\x01\x01").to_bytes() == b"0 \x01\x01\x00"
+    assert parts == codec.PartsResponse(parts=[])
+
+
 def test_what_it_repeats() -> None:
     codec = load(load_schema(REPOSITORY / "schemas" / "qlink.yaml"))
     response = GenericNode(codec, 4).handle(codec.LoopBackRequest(node=4, offset=3, data=b"abc"), 0.0)

@@ -13,7 +13,7 @@ from qlinkgen.plan.reading import BadFrame
 from qlinkgen.schema import loads
 from tests.support.whole.trial import Effort, run_text
 
-_METER = """\
+METER = """\
 qlinkgen: 1
 protocol: {name: meter, title: A voltmeter, revision: "1999.0", source: SCPI-99, doc: Commands and queries}
 enums:
@@ -103,7 +103,7 @@ def _codec(text: str) -> Codec:
     return Codec(plan_of(protocol))
 
 
-@pytest.mark.parametrize("text", [_METER, _SCALE, _COUNTED], ids=["meter", "scale", "counted"])
+@pytest.mark.parametrize("text", [METER, _SCALE, _COUNTED], ids=["meter", "scale", "counted"])
 def test_outputs_agree(text: str, require_tool: Callable[..., str]) -> None:
     for compiler, package in (("gcc", "gcc"), ("clang", "clang")):
         require_tool(compiler, package=package)
@@ -113,7 +113,7 @@ def test_outputs_agree(text: str, require_tool: Callable[..., str]) -> None:
 
 
 def test_frames_by_hand() -> None:
-    codec = _codec(_METER)
+    codec = _codec(METER)
     assert codec.encode("identify", {}) == b"*IDN?\n"
     assert codec.encode("measure", {"channel": 2}) == b"MEAS:VOLT? 2\n"
     assert codec.encode("measure.response", {"value": 0xC028_99999999_999A}) == b"-1.23E+01\n"
@@ -134,7 +134,7 @@ def test_frames_by_hand() -> None:
     ],
 )
 def test_ids_that_are_not_known_and_fields_that_do_not_follow_them(wire: bytes, kind: str) -> None:
-    codec = _codec(_METER)
+    codec = _codec(METER)
     with pytest.raises(BadFrame) as raised:
         codec.decode(wire, "request")
     assert raised.value.kind == kind
