@@ -363,7 +363,10 @@ class _Trial:
             self._stream("response", chance.damaged(data, data[:4], self.rng), tuple(asked))
 
     def _frames(self, message: Message) -> list[bytes]:
-        """The shortest of several frames, to save time; some with wrong contents, or a frame as payload."""
+        """The shortest of several frames, to save time; some with wrong contents, or a frame as payload.
+
+        Where ids are received in any case, some with letters of the other case.
+        """
         frames: list[bytes] = []
         odd: list[bytes] = []
         nested: list[bytes] = []
@@ -374,7 +377,10 @@ class _Trial:
             odd += chance.wrapped(self.reference, message, payload, place, self.rng)
             if chance.fits(self.reference, wire):
                 nested.append(self.reference.wrap(message.name, wire, place))
-        return [*sorted(frames, key=len)[:2], *sorted(odd, key=len)[:1], *sorted(nested, key=len)[:1]]
+        few = sorted(frames, key=len)[:2]
+        frame = self.reference.frame
+        cased = [wire.swapcase() for wire in few] if isinstance(frame, Frame) and frame.any_case else []
+        return [*few, *cased, *sorted(odd, key=len)[:1], *sorted(nested, key=len)[:1]]
 
     def _stream(self, direction: Direction, data: bytes, asked: tuple[bytes, ...] = ()) -> None:
         self.outcome.streams += 1
