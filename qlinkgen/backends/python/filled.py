@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from qlinkgen.backends.python import integers, pieces
-from qlinkgen.backends.python.layout import slice_of
+from qlinkgen.backends.python.layout import bare, slice_of
 from qlinkgen.backends.python.place import Place
 from qlinkgen.plan.expr import Size
 from qlinkgen.plan.payload import Equal, FilledStep
@@ -55,7 +55,7 @@ def right(step: FilledStep, place: Place) -> str:
     """The expression for a number, once the local ``covered`` is assigned."""
     rule = step.rule
     if isinstance(rule, Equal):
-        found = pieces.derived("covered", inverted=rule.inverted, added=rule.added, mask=step.integer.mask)
-        return found[1:-1] if found.startswith("(") else found
+        mask = step.integer.mask
+        return bare(pieces.derived("covered", inverted=rule.inverted, added=rule.added, mask=mask))
     name = place.check(rule)
     return f"{name}.compute(covered, {name}.start)"

@@ -14,7 +14,7 @@ from qlinkgen.backends.python.encode import Encoder
 from qlinkgen.backends.python.frame_checks import seed_name
 from qlinkgen.backends.python.frame_views import FrameView, PartsView
 from qlinkgen.backends.python.frames import parts_of_kind
-from qlinkgen.backends.python.layout import in_hex, literal
+from qlinkgen.backends.python.layout import bare, in_hex, literal
 from qlinkgen.backends.python.names import attribute, natural
 from qlinkgen.backends.python.place import Place
 from qlinkgen.model.naming import address_argument, address_attribute
@@ -370,7 +370,7 @@ def _number(part: LengthPart | CellPart | EqualPart) -> str:
             terms = [_bits(slot) for slot in part.slots]
             return terms[0].removeprefix("(").removesuffix(")") if len(terms) == 1 else " | ".join(terms)
         case EqualPart():
-            return pieces.derived_part(part, _local(part.of))
+            return bare(pieces.derived_part(part, _local(part.of)))
         case _:
             assert_never(part)
 

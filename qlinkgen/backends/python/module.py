@@ -144,7 +144,8 @@ class Module:
         views: Mapping[str, AnyView] = {
             way: _view(each, title, sizes, make) for way, each in plan.ways.items()
         }
-        view, sections = views[list(views)[-1]], Sections(views, plan.received_directions, bool(plan.beside))
+        view = views[list(views)[-1]]
+        sections = Sections(views, plan.received_directions, _based(plan), bool(plan.beside))
         decoded = decoded_directions(plan, sections.ways)
         quoted = [f'"{each.direction}"' for each in decoded]
         module = ModuleView(
@@ -308,6 +309,12 @@ class Module:
         if not isinstance(view, PacketView):
             names += ["encode", *(["Codec"] if view.check and view.check.selectable else [])]
         return sorted(set(names), key=by_kind)
+
+
+def _based(plan: Plan) -> tuple[str, ...]:
+    """The directions whose messages have a base class: those with messages, and requests, which it tells."""
+    sent = {"request", *(message.direction for message in plan.messages)}
+    return tuple(way for way in plan.ways if way and way in sent)
 
 
 def _view(plan: Plan, title: str, sizes: Sequence[int], make: Maker) -> AnyView:

@@ -36,11 +36,13 @@ class Sections:
     Attributes:
         views: the frame of each direction; that of both is called "".
         received: the directions that are decoded.
+        based: the directions whose messages have a base class, where directions have different frames.
         beside: frames have values.
     """
 
     views: Mapping[str, AnyView]
     received: Sequence[Direction]
+    based: Sequence[str]
     beside: bool
 
     @property
@@ -56,11 +58,15 @@ class Sections:
         found = templates().get_template(f"templates/{template}.j2")
         return found.render(f=view, directed=self.directed, beside=self.beside, **more)
 
+    def _owner(self, way: str) -> str:
+        """The class of the messages of a direction."""
+        return way_class(way) if way in self.based else "Message"
+
     @functools.cached_property
     def _made(self) -> Mapping[str, Mapping[str, str]]:
         """Definitions for encoding and for the parts of frames, by direction."""
         return {
-            way: definitions(self._rendered("delimited", view, owner=way_class(way)))
+            way: definitions(self._rendered("delimited", view, owner=self._owner(way)))
             for way, view in self.views.items()
         }
 
@@ -111,8 +117,8 @@ class Sections:
         if not self.directed:
             return (self._rendered("delimited", view, owner="Message") + message).strip()
         texts = [merged(self._made, self.ways), message]
-        for way, each in self.views.items():
-            text = self._rendered("delimited_way", each, base=way_class(way), way=way)
+        for way in self.based:
+            text = self._rendered("delimited_way", self.views[way], base=way_class(way), way=way)
             texts.append(self.ways.of(text, way))
         return "\n\n\n".join(text.strip() for text in texts)
 
