@@ -169,9 +169,10 @@ class SerialPort(StreamPort):
                 "let the device server or the adapter switch it",
                 port=self.name,
             )
-        if descriptor is None:
+        if _scheme(self.name) != "socket":
             return Capabilities(latency_source="pyserial does not report it")
-        settings.send_at_once(descriptor)
+        if descriptor is not None:
+            settings.send_at_once(descriptor)
         return Capabilities(paced=Ability.NO, latency_source="not available for a network connection")
 
     def write(self, data: bytes) -> None:

@@ -1,9 +1,11 @@
-"""A pipe that ends the wait of another thread in `select` or `poll`."""
+"""A pipe that ends the wait of another thread in `select` or `poll`; on Windows a pair of sockets."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import socket
+import sys
 from threading import RLock
 
 from qlinkgen.transport.forking import tell_of_forks
@@ -17,9 +19,15 @@ class Waker:
     """
 
     def __init__(self) -> None:
-        self.descriptor, self._write_end = os.pipe()
-        os.set_blocking(self.descriptor, False)
-        os.set_blocking(self._write_end, False)
+        if sys.platform == "win32":  # where `select` takes sockets only
+            self._ends = socket.socketpair()
+            for end in self._ends:
+                end.setblocking(False)
+            self.descriptor = self._ends[0].fileno()
+        else:
+            self.descriptor, self._write_end = os.pipe()
+            os.set_blocking(self.descriptor, False)
+            os.set_blocking(self._write_end, False)
         self._open = True
         self._lock = RLock()  # a handler may interrupt a call of its own thread
         tell_of_forks(self)
@@ -29,27 +37,37 @@ class Waker:
         with self._lock:
             if self._open:
                 with contextlib.suppress(BlockingIOError):  # a full pipe wakes as well
-                    os.write(self._write_end, b"!")
+                    if sys.platform == "win32":
+                        self._ends[1].send(b"!")
+                    else:
+                        os.write(self._write_end, b"!")
 
     def clear(self) -> None:
         """Undo every earlier `wake`."""
         with self._lock:
             if self._open:
                 with contextlib.suppress(BlockingIOError):  # not woken
-                    os.read(self.descriptor, 4096)
+                    if sys.platform == "win32":
+                        self._ends[0].recv(4096)
+                    else:
+                        os.read(self.descriptor, 4096)
 
     def close(self) -> None:
         """Close the pipe, once no thread waits on it. Closing twice is allowed."""
         with self._lock:
             if self._open:
                 self._open = False
-                os.close(self._write_end)
-                os.close(self.descriptor)
+                if sys.platform == "win32":
+                    for end in self._ends:
+                        end.close()
+                else:
+                    os.close(self._write_end)
+                    os.close(self.descriptor)
 
     def after_fork(self) -> None:
         """Make a new pipe and lock: the parent shares the old pipe, and its threads may hold the lock."""
         self._lock = RLock()
-        if self._open:
+        if self._open and sys.platform != "win32":
             ends = os.pipe()
             for new, old in zip(ends, (self.descriptor, self._write_end), strict=True):
                 os.set_blocking(new, False)
