@@ -37,6 +37,7 @@ DOCUMENTS = [
     "docs/stream-motion.md",
     "docs/load-firmware.md",
     "docs/own-io.md",
+    "docs/platforms.md",
     "docs/dialogues.md",
     "docs/timing.md",
     "docs/mc1231a.md",
