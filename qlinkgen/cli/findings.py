@@ -13,6 +13,7 @@ from qlinkgen.plan.describe import (
     bytes_text,
     check_text,
     constant_text,
+    digits_text,
     filled_number,
     filled_text,
     id_text,
@@ -145,6 +146,9 @@ def _beginning(found: Dissection, fault: Fault) -> Words:
 
 def _constant(found: Dissection, fault: Fault) -> Words:
     part = fault.of
+    if isinstance(part, AddressPart) and part.digits:
+        seen = found.cells[part.name].data
+        return f"{part.name} is {seen.hex(' ')}, must be {digits_text(part.digits)}", ""
     assert isinstance(part, ConstantPart | CellPart | EqualPart)
     right = part.data.hex(" ") if isinstance(part, ConstantPart) else part_text(part, found.frame)
     if isinstance(part, EqualPart):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import assert_never
 
+from qlinkgen.model.digits import Digits
 from qlinkgen.plan.content import unpack_items
-from qlinkgen.plan.describe import filled_number, id_text, part_text, unread_text, value_text
+from qlinkgen.plan.describe import digits_text, filled_number, id_text, part_text, unread_text, value_text
 from qlinkgen.plan.parts import (
     AddressPart,
     BlocksPart,
@@ -68,6 +69,8 @@ def _of_part(found: Dissection, part: Part, span: Span) -> str:
         case ConstantPart():
             first = part is found.frame.envelope.parts[0]
             return f"must be {part.data.hex(' ')}" if span.fault else "preamble" if first else ""
+        case AddressPart(digits=Digits() as digits) if span.fault and span.number is None:
+            return f"must be {digits_text(digits)}"
         case LengthPart() | AddressPart():
             return str(span.number)
         case IdPart():

@@ -20,6 +20,7 @@ class Digits:
         most: maximum number of characters.
         point: number of digits after the decimal point, 0 without one.
         spaced: spaces fill up a decimal number, before its sign. Zeros are received too.
+        plain: digits alone are received, neither a sign nor a decimal point.
     """
 
     base: Literal[10, 16]
@@ -27,6 +28,7 @@ class Digits:
     most: int
     point: int = 0
     spaced: bool = False
+    plain: bool = False
 
     @property
     def fixed(self) -> bool:
@@ -53,7 +55,9 @@ class Digits:
     def alphabet(self) -> frozenset[int]:
         """The bytes of a text."""
         spaces = frozenset(b" " if self.spaced else b"")
-        return spaces | frozenset(b"0123456789ABCDEFabcdef" if self.base == 16 else b"+-.0123456789")
+        if self.base == 16:
+            return frozenset(b"0123456789ABCDEFabcdef")
+        return spaces | frozenset(b"0123456789" if self.plain else b"+-.0123456789")
 
     def text(self, number: int) -> bytes:
         """The text of a number; it is longer than ``most`` if the number is not in range."""
@@ -70,6 +74,8 @@ class Digits:
         """The number of a text, None if it has none in these steps. Digits beyond the point may be zeros."""
         if self.base == 16:
             return int(text, 16) if _HEXADECIMAL.match(text) else None
+        if self.plain:
+            return int(text) if text.isdigit() else None
         text = self.trimmed(text)
         found = _DECIMAL.match(text)
         if found is None or not found[1] + found[2] or found[2][self.point :].strip(b"0"):

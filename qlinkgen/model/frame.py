@@ -11,6 +11,7 @@ from typing import Literal, assert_never, get_args
 from qlinkgen.model.checksum import Checksum as Algorithm
 from qlinkgen.model.coding import Coding, Escape, Insert
 from qlinkgen.model.condition import Condition
+from qlinkgen.model.digits import Digits
 from qlinkgen.model.fields import Field, Value
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer, pack_chunks
 from qlinkgen.model.texts import Text
@@ -129,7 +130,15 @@ class PartBits:
     text: bool = False
     #: The direction whose frames have them, None for both; a frame has parts of one direction instead.
     only: Direction | None = None
+    #: They are sent as text.
+    digits: Digits | None = None
     doc: Text = ""
+
+    @property
+    def most(self) -> int:
+        """Greatest number that they hold."""
+        most = (1 << self.bits) - 1
+        return min(most, self.digits.highest) if self.digits else most
 
     @property
     def is_id(self) -> bool:

@@ -145,7 +145,7 @@ def _stuffable(part: Part, message: Message, stuffing: FrameStuffing) -> int:
             return int(part.number(message.min_size) <= mark <= part.number(message.max_size))
         case IdPart(size=1):
             return int(message.id == mark)
-        case AddressPart(size=1):
+        case AddressPart(size=1) if not part.digits:
             return int(any(first <= mark <= last for first, last in message.addresses))
         case LengthPart() | IdPart() | AddressPart() | CellPart() | EqualPart() | CheckPart() | MarkPart():
             return part.size

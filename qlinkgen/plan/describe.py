@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import assert_never
 
 from qlinkgen.model.condition import Test
+from qlinkgen.model.digits import Digits as TextDigits
 from qlinkgen.model.frame import Silence
 from qlinkgen.model.integer import Chunk, Integer
 from qlinkgen.model.types import (
@@ -451,7 +452,7 @@ def part_text(part: Part, frame: FramePlan) -> str:  # noqa: C901  # a case a pa
         case IdPart():
             return "message id"
         case AddressPart():
-            return "address"
+            return f"address, {digits_text(part.digits)}" if part.digits else "address"
         case MarkPart():
             what = part.id_name if part.end_id is None else f"{part.end_id} in place of {part.id_name}"
             return f"0x{part.marker:02X}, {part.address_name}, {what}"
@@ -502,6 +503,12 @@ def _slot_text(part: CellPart, slot: Slot) -> str:
 def _counted(what: str, bias: int, scale: int = 1) -> str:
     text = f"{what} {'+' if bias > 0 else '-'} {abs(bias)}" if bias else what
     return f"({text}) / {scale}" if scale > 1 else text
+
+
+def digits_text(digits: TextDigits) -> str:
+    """How a number of a frame is sent as text."""
+    kind = "decimal" if digits.base == 10 else "hexadecimal"
+    return f"{digits.most} {kind} digit{'s' if digits.most > 1 else ''}"
 
 
 def check_text(check: Check, frame: FramePlan) -> str:

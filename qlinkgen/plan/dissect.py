@@ -454,7 +454,7 @@ class _Walk:
             case IdPart():
                 self._span(part, self.number, "unknown" if self._unknown(part) else "")
             case AddressPart():
-                self._span(part, self.address, self._addressed(part))
+                self._address(part)
             case CellPart() | EqualPart():
                 self._cell(part)
             case _:
@@ -466,6 +466,15 @@ class _Walk:
         if wrong:
             self._fault("frame", Rule.CONSTANT, places[0], part)
         self._span(part, None, "frame" if wrong else "")
+
+    def _address(self, part: AddressPart) -> None:
+        """Check an address, whose digits are wrong before it is."""
+        cell = self._found(part)
+        fault = self._addressed(part)
+        if len(cell.data) == part.size and is_wrong(part, {part.name: cell.data}):
+            fault = "frame"
+            self._fault(fault, Rule.CONSTANT, cell.places[0], part)
+        self._span(part, self.address, fault)
 
     def _cell(self, part: CellPart | EqualPart) -> None:
         """Check the constants, the message number and the address in the bits of an integer."""

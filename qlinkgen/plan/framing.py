@@ -481,7 +481,11 @@ def _unique(envelope: Envelope, stuffing: FrameStuffing) -> bool:
         return False
     assert check is not None
     inner = envelope.parts[1:-1]
-    plain = not any(isinstance(part, ConstantPart | CellPart | EqualPart) for part in inner)
+    plain = not any(
+        isinstance(part, ConstantPart | CellPart | EqualPart)
+        or (isinstance(part, AddressPart) and part.digits)
+        for part in inner
+    )
     number = [bits.part.size for bits in envelope.id] == [1]
     return plain and number and envelope.coverage(check) == (inner,) and check.check.regular is not None
 

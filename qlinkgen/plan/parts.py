@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from qlinkgen.model.digits import Digits
 from qlinkgen.model.integer import Chunk, Integer
 from qlinkgen.model.types import Settable
 from qlinkgen.plan.check import Check
@@ -40,6 +41,11 @@ class _IntegerPart:
     def size(self) -> int:
         """Bytes before stuffing."""
         return self.integer.size
+
+    @property
+    def digits(self) -> Digits | None:
+        """Its digits if it is sent as text, which other characters make no frame; None if it is not."""
+        return self.integer.text if isinstance(self.integer.text, Digits) else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,19 +284,12 @@ class CellPart(LeadingPart):
 
 
 @dataclass(frozen=True, slots=True)
-class EqualPart:
+class EqualPart(_IntegerPart):
     """An integer derived from an earlier one of the same size: inverted or not, plus ``added``."""
 
-    name: str
-    integer: Integer
     of: LengthPart | IdPart | AddressPart | CellPart
     inverted: bool
     added: int
-
-    @property
-    def size(self) -> int:
-        """Bytes before stuffing."""
-        return self.integer.size
 
     def value(self, number: int) -> int:
         """The integer for a value of the other."""
@@ -322,11 +321,11 @@ class Bits:
 
 
 def gathered(pieces: tuple[Bits, ...], cells: Mapping[str, bytes]) -> int | None:
-    """The number or address in the bytes of parts; None if a piece is missing."""
+    """The number or address in the bytes of parts; None if a piece is missing or has wrong digits."""
     number = 0
     for bits in pieces:
         data = cells.get(bits.part.name, b"")
-        if len(data) < bits.part.size:
+        if len(data) < bits.part.size or (bits.part.digits and bits.part.digits.number(data) is None):
             return None
         number |= (bits.part.integer.unpack(data) >> bits.shift & bits.mask) << bits.at
     return number

@@ -417,8 +417,10 @@ class KindsReader:
 
 
 def is_wrong(part: Part, cells: Mapping[str, bytes]) -> bool:
-    """Whether a received constant, or a derived number, is wrong."""
+    """Whether a received constant, a derived number, or one of the digits of a number is wrong."""
     match part:
+        case AddressPart() if part.digits:
+            return part.digits.number(cells[part.name]) is None
         case ConstantPart():
             return cells[part.name] != part.data
         case CellPart():

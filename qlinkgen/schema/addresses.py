@@ -46,7 +46,7 @@ def check_addresses(frame: Frame | None, bus: Bus, master: int | None, report: R
         what = "node address 0 is not allowed in a marked frame"
         report.error("bad-addressing", ("bus", "nodes"), what, "begin the nodes at 1", needs=_NEEDS)
     called = frame.towards("request").address if isinstance(frame, DelimitedFrame) else None
-    _check_broadcast(bus, bus.nodes, (1 << called.bits) - 1 if called else highest, report)
+    _check_broadcast(bus, bus.nodes, called.most if called else highest, report)
 
 
 def _highest(frame: Frame) -> int | None:
@@ -56,10 +56,9 @@ def _highest(frame: Frame) -> int | None:
             return frame.address_bits.mask
         case DelimitedFrame():
             found = [frame.towards(each).address for each in get_args(Direction)]
-            sizes = [each.bits for each in found if each]
-            return (1 << min(sizes)) - 1 if sizes else None
+            return min((each.most for each in found if each), default=None)
         case FrameKinds():
-            return (1 << frame.address.bits) - 1 if frame.address else None
+            return frame.address.most if frame.address else None
         case PacketFrame():
             return None
         case _:

@@ -207,7 +207,7 @@ class PartSpec(Fact):
     as_: str | None = Field(
         default=None,
         alias="as",
-        description="Form of the checksum: hex[2] or decimal[3], two or three digits",
+        description="Form of an address or a checksum: hex[2] or decimal[3], two or three digits",
     )
     only: list[str] | None = Field(default=None, description="Messages with the checksum; default: all")
     words: Annotated[StrictInt, Field(ge=1, le=8)] = Field(1, description="Size of the words that a sum adds")

@@ -13,6 +13,7 @@ from qlinkgen.schema.file_frames import FrameSpec, KindSpec, MarkedSpec, PartSpe
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.part_conditions import PartConditions, check_conditions
+from qlinkgen.schema.part_digits import check_kind
 from qlinkgen.schema.part_directions import check_directions
 from qlinkgen.schema.part_texts import without_end
 from qlinkgen.schema.parties import with_parties
@@ -167,6 +168,8 @@ class FrameBuilder:
             self._parts.check_opening(given[opening], (*path, opening))
         parts = with_text_id(parts, opening, given.get(opening))
         parts = PartConditions(specs, path, self._report).added(parts)
+        if not isinstance(spec, FrameSpec):
+            check_kind(specs, path, self._report)
         stuffed = spec.stuffing if isinstance(spec, FrameSpec) else None
         coded_as = coding_without(spec.coding, opening)
         alone = bool(silence and silence.alone)

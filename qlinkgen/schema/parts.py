@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -16,6 +15,7 @@ from qlinkgen.schema.file_frames import PartKind, PartSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.notation import DERIVED, Duration, shown
+from qlinkgen.schema.part_digits import FORM, check_source, in_digits
 from qlinkgen.schema.part_directions import direction_of
 from qlinkgen.schema.pieces import PieceBuilder, text_size
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -26,7 +26,6 @@ from qlinkgen.schema.types import TypeBuilder
 #: The least number that hands over to a longer length: one below it states a size other than 0.
 _LEAST_OTHERWISE = 2
 #: Decimal digits of a checksum; as many as the widest one may have.
-_DECIMAL = re.compile(r"\s*decimal\s*\[\s*([1-9]|1[0-9]|20)\s*\]\s*", re.ASCII)
 _MOST_DIGITS = 20
 _INTEGERS = {f"u{8 * size}": size for size in range(1, 9)}
 _SINGLE_ROLES = (
@@ -51,7 +50,7 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "counter": ("type", "byteorder", "per", "echo", "repeats"),
     "length": ("type", "byteorder", "counts", "scale", "offset", "range", "otherwise"),
     "message": ("type", "byteorder"),
-    "address": ("type", "byteorder"),
+    "address": ("type", "byteorder", "as"),
     "destination": ("type", "byteorder"),
     "source": ("type", "byteorder"),
     "payload": ("size", "trim"),
@@ -60,11 +59,10 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "idle": ("time", "at_least", "alone"),
     "break": ("time", "at_least", "alone"),
 }
-#: Roles of parts that are numbers, beside check values.
+#: Roles of parts that are numbers and not sent as digits.
 _NUMBERS = (
     "length",
     "message",
-    "address",
     "destination",
     "source",
     "direction",
@@ -283,7 +281,7 @@ class PartBuilder:
                 continue
             article = "an" if role[0] in "aeiou" else "a"
             if key == "as" and role in _NUMBERS:
-                what = f"{path[-1]} is {article} {role}, and only check values of a frame are sent as digits"
+                what = f"{path[-1]} is {article} {role}, and only addresses and check values may be digits"
                 hint = "describe it as text with as many characters, type: text[N]"
                 self.fault("bad-digits", (*path, key), what, hint)
                 self._report.taint((*path, key))
@@ -305,7 +303,7 @@ class PartBuilder:
             self._lacks("value", "add value: A5 A5", path)
         return spec.value or (spec.text or "\0").encode("ascii")
 
-    def _derivation(self, spec: PartSpec, names: Iterable[str], path: Path) -> Derivation:
+    def _derivation(self, spec: PartSpec, names: Mapping[str, PartSpec], path: Path) -> Derivation:
         match = DERIVED.match(spec.equals or "")
         order, name = list(names), path[-1]
         if match is None:
@@ -319,6 +317,7 @@ class PartBuilder:
         elif order.index(match["name"]) >= order.index(str(name)):
             what, hint = f"{match['name']} does not precede {name}", f"move {name} after it"
         else:
+            check_source(match["name"], names[match["name"]], path, self._report)
             return Derivation(
                 match["name"], bool(match["not"]), int((match["added"] or "0").replace(" ", ""))
             )
@@ -356,7 +355,11 @@ class PartBuilder:
             self._report.taint((*path, "type"))
             size = 1
         chunks = byte_chunks(size, spec.byteorder or self._file.byteorder)
-        return Scalar(bits=8 * size, chunks=chunks, minimum=0, maximum=(1 << 8 * size) - 1)
+        scalar = Scalar(bits=8 * size, chunks=chunks, minimum=0, maximum=(1 << 8 * size) - 1)
+        if spec.told != "address" or spec.as_ is None:
+            return scalar
+        self.reject(spec, ("byteorder",), "digits", path)
+        return in_digits(scalar, spec, path, self._report)
 
     def known(self, names: Iterable[str], parts: Iterable[str], path: Path) -> None:
         """Check that names refer to parts, without repetition, in wire order."""
@@ -454,8 +457,8 @@ class PartBuilder:
     def _as_digits(self, spec: PartSpec, scalar: Scalar, path: Path) -> tuple[Chunk, ...]:
         """The digits of a checksum."""
         self.reject(spec, ("byteorder", "sent", "every"), "digits", path)
-        if found := _DECIMAL.fullmatch(spec.as_ or ""):
-            return (Chunk(0, scalar.bits),) * int(found[1])
+        if (found := FORM.fullmatch(spec.as_ or "")) and found["name"] == "decimal":
+            return (Chunk(0, scalar.bits),) * int(found["size"])
         right = f"hex[{scalar.bits // 4}]"
         if (spec.as_ or "").replace(" ", "") != right:
             what = f"a checksum of {scalar.bits} bits is not {shown(spec.as_)}"
@@ -468,7 +471,8 @@ def _base(form: str | None) -> Literal[0, 10, 16]:
     """The base of the digits of a checksum, 0 if it is sent as bytes."""
     if form is None:
         return 0
-    return 10 if _DECIMAL.fullmatch(form) else 16
+    found = FORM.fullmatch(form)
+    return 10 if found and found["name"] == "decimal" else 16
 
 
 def _roles(specs: Mapping[str, PartSpec], path: Path) -> Iterator[tuple[str, str, Path]]:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from qlinkgen.model.digits import Digits
 from qlinkgen.model.fields import FieldType
 from qlinkgen.model.frame import Counting, DelimitedFrame, Frame, Part, PartBits
 from qlinkgen.model.message import Direction
@@ -41,7 +42,13 @@ class PieceBuilder:
                 directions = self._directions(spec, scalar.bits, path) if role == "direction" else {}
                 text = role == "message" and text_size(spec.type) > 0
                 return PartBits(
-                    name=name, role=role, shift=0, bits=scalar.bits, directions=directions, text=text
+                    name=name,
+                    role=role,
+                    shift=0,
+                    bits=scalar.bits,
+                    directions=directions,
+                    text=text,
+                    digits=scalar.text if isinstance(scalar.text, Digits) else None,
                 )
             case "destination" | "source" as party:
                 number = self._number(name, 0, scalar, spec.doc, path)

@@ -87,7 +87,8 @@ _ALL = (
     ),
     Rule(
         "bad-digits",
-        "A number as text has room for its digits, and a receiver finds its end.",
+        "A number as text has room for its digits, the type of an address holds each number of them, "
+        "and a receiver finds the end of a text.",
         "Decimal digits show steps of 1, 1/10, 1/100 and so on exactly, and no others. A text of varying "
         "size ends at a separator.",
     ),

@@ -98,6 +98,8 @@ def _bytes_of(part: Part, frame: DelimitedFrame, messages: Sequence[Message]) ->
             )
         case "message" | "address" | "bits":
             assert part.scalar is not None
+            if part.scalar.text:
+                return part.scalar.text.alphabet
             return _joined(_bytes_of_pieces(part, chunk, messages) for chunk in part.scalar.chunks)
         case "derived":
             return ALL_BYTES

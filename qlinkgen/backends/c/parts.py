@@ -10,6 +10,7 @@ from qlinkgen.backends.c import filled
 from qlinkgen.backends.c.check_values import CheckWriter
 from qlinkgen.backends.c.checks import as_unsigned, from_unsigned, refused_before_sending
 from qlinkgen.backends.c.conditional import ConditionalView, holds, refused
+from qlinkgen.backends.c.layout import pointer
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.backends.c.places import any_of, in_hex, refusal, shifted
 from qlinkgen.model.naming import member
@@ -296,8 +297,17 @@ class PartWriter(CheckWriter):
         yield from self._wrong(part)
 
     def _wrong(self, part: Part) -> Iterator[str]:
-        """Conditions that hold if a constant or a derived number in an integer is wrong."""
+        """Conditions that hold if a constant, a derived number or a digit in an integer is wrong."""
         match part:
+            case AddressPart() if part.digits:
+                place, at = "end" if part in self.envelope.back else "body", self._at(part)
+                if part.digits.base == 16:
+                    yield self.layouts.wrong(
+                        part.integer, part.digits, pointer(place, str(at)), f"{part.size}U"
+                    )
+                    return
+                for each in (f"{place}[{at + index}]" for index in range(part.size)):
+                    yield f"({each} < 0x30U) || ({each} > 0x39U)"
             case CellPart():
                 for slot in part.constants:
                     found = self.taken(self.get(part), slot, whole=slot.bits == part.integer.bits)

@@ -169,8 +169,10 @@ class Places:
     def get(self, part: Numeric, place: str = "") -> str:
         """The expression for the integer of a part, in a body or after the payload."""
         place = place or ("end" if part in self.envelope.back else "body")
-        found, mask = self.layouts.get(part.integer, place, str(self._at(part))), part.integer.chunks[0].mask
-        return found if part.size > 1 or mask == 0xFF else f"({found} & {in_hex(mask)})"
+        found = self.layouts.get(part.integer, place, str(self._at(part)))
+        if part.size > 1 or part.digits or (mask := part.integer.chunks[0].mask) == 0xFF:
+            return found
+        return f"({found} & {in_hex(mask)})"
 
     @staticmethod
     def taken(found: str, bits: Bits | Slot | Selector, *, whole: bool) -> str:

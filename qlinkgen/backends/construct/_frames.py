@@ -623,7 +623,7 @@ class Frame(Construct):
                 found[kind] |= (number & (1 << size) - 1) << at
 
     def _refuse(self, part: Part, cells: Mapping[str, bytes]) -> None:
-        """Check a constant, or a derived number."""
+        """Check a constant, a derived number, or the digits of an address."""
         seen, wrong = cells[part.name], False
         match part:
             case Constant():
@@ -637,6 +637,11 @@ class Frame(Construct):
                 )
             case Equal():
                 wrong = seen != self._equal(part, cells)
+            case Address():
+                try:
+                    part.integer.parse(seen)
+                except ValidationError:
+                    wrong = True
             case _:
                 pass
         if wrong:
@@ -835,8 +840,8 @@ class DelimitedFrame(Frame):
                 cells[part.name] = self._taken(source, part, cells)
                 if Payload not in numbers:
                     self._header(part, cells, numbers)
-        self._identify(cells, numbers)
         payload = self._plain(cells)
+        self._identify(cells, numbers)
         source.end()
         return self._judged(cells, numbers[Id], payload, numbers.get(Address, 0))
 

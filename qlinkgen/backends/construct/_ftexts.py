@@ -63,7 +63,8 @@ class TextNumber(Construct):
     """An integer from low to high as text of ``least`` to ``most`` characters.
 
     ``point`` digits follow the decimal point. One that is ``spaced`` begins with
-    spaces. One of variable size is all bytes, which the Message limits.
+    spaces. One that is ``plain`` has digits alone. One of variable size is all
+    bytes, which the Message limits.
     """
 
     def __init__(
@@ -76,6 +77,7 @@ class TextNumber(Construct):
         high: int,
         point: int = 0,
         spaced: bool = False,
+        plain: bool = False,
     ) -> None:
         super().__init__()
         self.base = base
@@ -85,6 +87,7 @@ class TextNumber(Construct):
         self.high = high
         self.point = point
         self.spaced = spaced
+        self.plain = plain
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> int:
         if self.least == self.most:
@@ -99,6 +102,8 @@ class TextNumber(Construct):
     def _number(self, text: bytes) -> int | None:
         if self.base == 16:
             return int(text, 16) if _HEXADECIMAL.match(text) else None
+        if self.plain:
+            return int(text) if text.isdigit() else None
         text = text.lstrip(b" ") if self.spaced else text
         found = _DECIMAL.match(text)
         if found is None or (self.low >= 0 and text[:1] in (b"+", b"-")):

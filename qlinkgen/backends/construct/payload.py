@@ -61,7 +61,8 @@ def integer(kind: Integer, *, signed: bool | None = None) -> Node:
         limits = (("low", kind.minimum), ("high", kind.maximum))
         point = (("point", text.point),) if text.point else ()
         spaced = (("spaced", True),) if text.spaced else ()
-        return Call("TextNumber", (text.base, text.least, text.most), limits + point + spaced)
+        plain = (("plain", True),) if text.plain else ()
+        return Call("TextNumber", (text.base, text.least, text.most), limits + point + spaced + plain)
     if kind.bcd:
         swapped = (("swapped", True),) if kind.byteorder == "little" and kind.size > 1 else ()
         return Call("BcdInteger", (kind.size,), swapped)

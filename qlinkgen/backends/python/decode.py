@@ -293,6 +293,9 @@ class Decoder:
         taken = integers.get(integer, local, self.place.byteorder)
         if not taken.terms:
             return
+        if isinstance(integer.text, Digits) and integer.text.plain:
+            self._values.append(f"{local} = {integers.number_in(integer, local)}")
+            return
         if integer.text:
             text = f"{local.removesuffix('_raw')}_text"
             self._values += [f"{text} = {local}", f"{local} = {self._number_in(integer, text)}"]

@@ -40,6 +40,7 @@ from qlinkgen.plan.expr import OneOf, Within
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import (
     AddressPart,
+    Bits,
     BlocksPart,
     CellPart,
     CheckPart,
@@ -89,8 +90,15 @@ def _address_view(plan: Plan) -> AddressView | None:
         parameter=address_argument(plan.frame.address),
         bytes=integers.to_bytes(bits.part.integer, placed) if bits else "",
         default=nodes[0] if nodes else 0,
-        limit=f"0x{bits.mask:X}" if bits and not bits.whole else "",
+        limit=_limit(bits) if bits else "",
     )
+
+
+def _limit(bits: Bits) -> str:
+    """The greatest address, "" if the conversion to bytes refuses a greater one."""
+    if not bits.whole:
+        return f"0x{bits.mask:X}"
+    return str(bits.part.integer.maximum) if bits.part.digits else ""
 
 
 def _blank_header(envelope: Envelope, start: int, address: AddressView | None) -> str:

@@ -104,12 +104,14 @@ def _width(least: int) -> str:
 
 
 def number_in(integer: Integer, text: str) -> str:
-    """The number of a text, or one above the maximum of the integer."""
+    """The number of a text, or one above the maximum of the integer; of digits alone, the number."""
     assert integer.text
     if isinstance(integer.text, Words):
         text = f"{text}.upper()" if integer.text.folded else text
         return f"{numbers_of(integer.text)}.get({text}, {integer.maximum + 1})"
     assert not isinstance(integer.text, Scientific)  # floats, not integers, are read
+    if integer.text.plain:  # its digits have been checked
+        return f"int({text})" if integer.text.base == 10 else f"int({text}, 16)"
     text = f'{text}.lstrip(b" ")' if integer.text.spaced else text
     if integer.text.base == 16:
         return f"read_hexadecimal({text}, {integer.maximum})"
@@ -149,9 +151,9 @@ def read(integer: Integer, data: str, at: Callable[[int], str]) -> str:
 
     Too few bytes result in a wrong number or an IndexError.
     """
-    if integer.size == 1:
+    if integer.size == 1 and not integer.text:
         return f"{data}[{at(0)}]"
-    if integer.byteorder is not None:
+    if integer.text or integer.byteorder is not None:
         return from_bytes(integer, slice_of(data, at(0), at(integer.size)))
     sources = tuple(f"{data}[{at(index)}]" for index in range(integer.size))
     return " | ".join(group_terms(integer, own_bits(integer, sources)))

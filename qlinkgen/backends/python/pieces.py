@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from qlinkgen.backends.python import integers
 from qlinkgen.backends.python.layout import in_hex, literal, slice_of
 from qlinkgen.plan.envelope import Envelope
-from qlinkgen.plan.parts import Bits, CellPart, ConstantPart, EqualPart, Numeric, Part
+from qlinkgen.plan.parts import AddressPart, Bits, CellPart, ConstantPart, EqualPart, Numeric, Part
 
 #: A frame that begins anywhere in a buffer, as the source and base of these functions.
 BUFFER = ("buf", "start")
@@ -44,8 +44,13 @@ def read(envelope: Envelope, part: Numeric, source: str, base: str = "", skipped
 
 
 def wrong(envelope: Envelope, part: Part, source: str, base: str = "") -> Iterator[str]:
-    """Conditions that hold if a constant or a derived number in an integer is wrong."""
+    """Conditions that hold if a constant, a derived number or a digit in an integer is wrong."""
     match part:
+        case AddressPart() if part.digits:
+            legal = literal(bytes(sorted(part.digits.alphabet)))
+            first = envelope.offset(part) if part in envelope.front else -envelope.from_end(part)
+            for at in range(first, first + part.size):
+                yield f"{source}[{integers.index_of(base, at)}] not in {legal}"
         case CellPart():
             for slot in part.constants:
                 seen = read(envelope, part, source, base)

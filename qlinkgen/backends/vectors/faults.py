@@ -201,6 +201,8 @@ class _Frame:
             case LengthPart() | IdPart() | AddressPart() | CellPart() | EqualPart():
                 for number in self._numbers(part):
                     yield f"{name} is {number}", {name: part.integer.pack(number)}
+                if part.digits:
+                    yield f"{name} is not a number", {name: part.digits.wrong}
             case MarkPart():
                 yield from self._marks(part)
             case PayloadPart():

@@ -61,6 +61,8 @@ class Shape:
     ways: list[str] = field(default_factory=list)
     #: Number of the master, None if frames have none.
     master: int | None = None
+    #: The greatest address, 0 if its bits tell.
+    address_top: int = 0
 
     @property
     def shares(self) -> bool:
@@ -275,7 +277,7 @@ class _Parts:
         roles = self._header(hunted=hunted)
         for role in roles:
             name, spec = self._header_part(role)
-            names[role] = self._add(name, spec | {"type": "u8"} if strict else spec)
+            names[role] = self._add(name, self._in_digits(spec | {"type": "u8"} if strict else spec))
         if self._chance(0.08) and not hunted:
             self._add("gap", {"role": "constant", "value": "55"})
         names["payload"] = self._add("data", {"role": "payload"})
@@ -364,7 +366,10 @@ class _Parts:
         names: Doc = {}
         for role in roles:
             name, spec = self._header_part(role)
-            names[role] = self._add(name, spec if coded else spec | {"type": "u8"})
+            names[role] = self._add(name, self._in_digits(spec if coded else spec | {"type": "u8"}))
+        if "address" not in names and not coded and self._other.random() < 0.3:
+            spec = self._in_digits({"role": "address", "type": "u8"}, always=True)
+            names["address"] = self._add("node", spec)
         if self._chance(0.1):
             self._add("version", {"role": "constant", "value": "01"})
         return names
@@ -394,6 +399,21 @@ class _Parts:
             kind = rng.choices(("u8", "u16", "u24", "u32", "u64"), (30, 5, 1, 2, 1))[0]
         name = {"message": "code", "address": "node", "length": "length"}[role]
         return name, {"role": role, "type": kind, **order(rng)}
+
+    @property
+    def _other(self) -> random.Random:
+        """Another source: the schemas of earlier seeds stay what they are."""
+        return random.Random(f"digits {self.rng.getstate()!r}")
+
+    def _in_digits(self, spec: Doc, *, always: bool = False) -> Doc:
+        """An address that may be sent as digits."""
+        rng = self._other
+        if spec["role"] != "address" or not (always or rng.random() < 0.2):
+            return spec
+        most = min(16, bits_of_type(spec["type"]) // 4)
+        form = rng.choice(("hex", "decimal"))
+        size = rng.randint(1, most) if form == "hex" else len(str(1 << 4 * most)) - 1
+        return {"role": "address", "type": spec["type"], "as": f"{form}[{size}]"}
 
     def _checked(self, names: Doc, *, whole: bool) -> None:
         """A check value; `whole`: over everything after the first part, and sent whole."""
@@ -559,6 +579,7 @@ class _Parts:
             int(stuffing["after"].split()[0], 16) if stuffing else 0xA5,
             seeds=self.seeds,
             trimmed=trimmed,
+            address_top=_top(address),
         )
 
     def _longest(self, names: Doc, stuffing: Doc, most: int, *, below: bool) -> int:
@@ -576,6 +597,14 @@ class _Parts:
         if mark > 4 and self._chance(0.5):
             most = self.rng.choice((mark - 1, mark, mark + 40))
         return max(4, min(most, top))
+
+
+def _top(address: Doc) -> int:
+    """The greatest address, 0 without one."""
+    name, _, size = address.get("as", "").partition("[")
+    if name:
+        return int((10 if name == "decimal" else 16) ** int(size[:-1])) - 1
+    return (1 << int(address["type"][1:])) - 1 if address else 0
 
 
 def _size(part: Doc) -> int:

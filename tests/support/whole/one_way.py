@@ -49,7 +49,11 @@ def _insert(rng: random.Random, frame: Doc, name: str, spec: Doc, at: int) -> No
 
 def _part(rng: random.Random, parts: Doc, *, plain: bool) -> Doc:
     """A constant, a value, bits, or a derived number."""
-    sources = [name for name, spec in parts.items() if spec.get("role") in ("address", "message")]
+    sources = [
+        name
+        for name, spec in parts.items()
+        if spec.get("role") in ("address", "message") and "as" not in spec
+    ]
     whole = [name for name in sources if str(parts[name]["type"]).startswith("u")]
     kinds: list[Doc] = [
         {"value": "01"} if plain else {"value": rng.choice(("55", "01 02", "5A"))},

@@ -25,7 +25,7 @@ def add(rng: random.Random, frame: Doc) -> int:
         for inner in (spec, *spec.get("bits", {}).values())
         if isinstance(inner, dict) and inner.get("role") == "address"
     ]
-    if not at:
+    if not at or "as" in at[0][1]:
         return 0
     (spec, inner), name, roles = at[0], "partner", rng.sample(_ROLES, 2)
     low, high = whole_span(inner["at"]) if "at" in inner else (0, bits_of_type(spec["type"]) - 1)

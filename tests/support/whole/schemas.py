@@ -245,7 +245,7 @@ class _Maker:
         return bus
 
     def _addresses(self, shape: Shape) -> Doc:
-        rng, top = self.rng, (1 << shape.address_bits) - 1
+        rng, top = self.rng, shape.address_top or (1 << shape.address_bits) - 1
         least = 1 if shape.kind == "marked" else 0
         ranges = ((1, 8), (0, top), (1, top - 1), (0, 3), (top, top), (top // 2, top - 1))
         first, last = (min(max(end, least), top) for end in rng.choice(ranges))

@@ -64,6 +64,28 @@ class Part:
     values: tuple[tuple[str, int, Number], ...] = ()
 
     @property
+    def base(self) -> int:
+        """The base of its digits if it is a number in digits, 0 if it is not."""
+        shown = str(self.spec.get("as", "")) if self.role == "bits" else ""
+        return {"": 0, "hex": 16, "decimal": 10}[shown.partition("[")[0]]
+
+    def raw(self, data: bytes) -> int:
+        """Its number; wrong digits are 0."""
+        if self.base:
+            return int(data, self.base) if self.legible(data) else 0
+        return get(self.pieces, data)
+
+    def data(self, raw: int) -> bytes:
+        """Its bytes."""
+        if self.base:
+            return f"{raw:0{self.size}{'X' if self.base == 16 else 'd'}}".encode()
+        return put(self.pieces, raw)
+
+    def legible(self, data: bytes) -> bool:
+        """Whether each byte is a digit."""
+        return all(byte in b"0123456789abcdefABCDEF"[: 10 if self.base == 10 else 22] for byte in data)
+
+    @property
     def mask(self) -> int:
         """All its bits."""
         return (1 << 8 * self.size) - 1
@@ -118,7 +140,9 @@ def part_of(name: str, spec: object, order: str, fields: Fields) -> Part:
     pieces = byte_pieces(bits_of_type(spec["type"]) // 8, order)
     if "sent" in spec:
         pieces = tuple((first, last + 1 - first) for first, last in map(whole_span, spec["sent"]))
-    if "as" in spec:
+    if spec["role"] == "address" and "as" in spec:
+        pieces = ((0, 8),) * int(spec["as"].partition("[")[2][:-1])
+    elif "as" in spec:
         pieces = tuple((at, 4) for at in range(bits_of_type(spec["type"]) - 4, -1, -4))
         if (digits := spec["as"].removeprefix("decimal[").rstrip("]")).isdecimal():
             pieces = ((0, bits_of_type(spec["type"])),) * int(digits)
@@ -372,7 +396,7 @@ class Frame:
         # Message number and address are whole parts.
         alone = [part.bits[0] for part in self.parts if len(part.bits) == 1 and "at" not in part.bits[0][3]]
         kinds = sorted((role, bits if role == "message" else 0) for role, _, bits, _ in alone)
-        if any(part.values for part in self.parts):
+        if any(part.values or part.base for part in self.parts):
             return False
         if len(alone) < roles.count("bits") or kinds not in (
             [("message", 8)],
@@ -416,7 +440,7 @@ class Frame:
                         continue
                     fixed = {"address": address, "constant": _several(spec.get("const"))[0]}
                     raw |= (rest[part.name, shift] if role not in fixed else fixed[role]) << shift
-                cut[part.name] = put(part.pieces, raw)
+                cut[part.name] = part.data(raw)
             elif part.role == "derived":
                 cut[part.name] = put(part.pieces, self.derived(part, cut))
             else:
@@ -591,6 +615,8 @@ class Frame:
             return cut[part.name] != part.constant
         if part.role == "derived":
             return get(part.pieces, cut[part.name]) != self.derived(part, cut)
+        if part.base:
+            return not part.legible(cut[part.name])
         return part.role == "bits" and not part.accepts(get(part.pieces, cut[part.name]))
 
     def number(self, role: str, cut: Mapping[str, bytes]) -> int | None:
@@ -620,7 +646,7 @@ class Frame:
         number = 0
         for name, shift, bits, _ in found:
             part = next(each for each in self.parts if each.name == name)
-            number = number << bits | get(part.pieces, cut[name]) >> shift & (1 << bits) - 1
+            number = number << bits | part.raw(cut[name]) >> shift & (1 << bits) - 1
         return number
 
 
