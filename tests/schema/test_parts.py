@@ -74,7 +74,7 @@ def test_other_keys_tell_the_role() -> None:
         ({"start": '{text: ""}'}, "5:19", "'' is not text of printable ASCII characters"),
         ({"start": '{text: "é"}'}, "5:19", "'é' is not text of printable ASCII characters"),
         ({"start": "{role: payload, size: 3, text: x}"}, "8:5", "data and start are both the payload"),
-        ({"length": "{role: address, type: u8, text: x}"}, "6:39", "'text' has no effect on a address here"),
+        ({"length": "{role: address, type: u8, text: x}"}, "6:39", "'text' has no effect on an address here"),
     ],
 )
 def test_wrong_parts(written: dict[str, str], where: str, what: str) -> None:
