@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 from qlinkgen.link.codec import Module
+
+#: Seconds of silence after which a slave no longer awaits the rest of a frame: longer than drivers, adapters
+#: and programs delay its bytes, and shorter than most masters await an answer before they ask again.
+ABANDONED = 0.1
 
 
 def idle_of(codec: Module, byte_time: float) -> float:
@@ -30,14 +36,18 @@ class Gap:
         due: when the line will have been idle, None if no bytes wait for it.
     """
 
-    __slots__ = ("due", "span")
+    __slots__ = ("_abandoned", "_heard_at", "due", "span")
 
-    def __init__(self, span: float) -> None:
+    def __init__(self, span: float, abandoned: float = math.inf) -> None:
+        """``abandoned``: seconds after which the rest of a frame no longer comes, whatever ends it."""
         self.span = span
+        self._abandoned = abandoned
+        self._heard_at = math.inf
         self.due: float | None = None
 
     def heard(self, now: float) -> None:
         """Restart the silence after received bytes."""
+        self._heard_at = now
         if self.span:
             self.due = now + self.span
 
@@ -47,6 +57,10 @@ class Gap:
             return False
         self.due = None
         return True
+
+    def ended(self, now: float) -> bool:
+        """Whether bytes received now begin a frame: the silence before them is over, or was so long."""
+        return self.passed(now) or now - self._heard_at > self._abandoned
 
     def before(self, other: float | None) -> float | None:
         """The earlier of two times, either of which may be missing."""

@@ -23,7 +23,7 @@ from qlinkgen.link.codec import (
 )
 from qlinkgen.link.echo import EchoCanceller
 from qlinkgen.link.events import Frame, heard
-from qlinkgen.link.gaps import Gap, break_of, idle_of
+from qlinkgen.link.gaps import ABANDONED, Gap, break_of, idle_of
 from qlinkgen.link.kept import kept_of
 from qlinkgen.link.many import nodes_asked
 from qlinkgen.link.numbering import numbering_of, repeat, repeated_of
@@ -137,7 +137,7 @@ class SlaveEngine:
             echo: whether the adapter echoes sent bytes. An answer can be the same bytes as its request, so
                 with an unexpected echo the node would answer itself endlessly.
             host_slack: largest delay with which bytes of one frame arrive; where a silence ends a frame, the
-                node waits for it that much longer.
+                node waits for it that much longer. After 0.1 s more it no longer awaits the rest of a frame.
             decoder: that of a `PeerEngine`; by default its own.
         """
         if echo not in ("expect", "none"):
@@ -185,7 +185,7 @@ class SlaveEngine:
         self._unknown = unknown_requests(codec, self._byte_time)
         self.break_time = break_of(codec, self._byte_time)
         idle = idle_of(codec, self._byte_time)
-        self._gap = Gap(idle + host_slack if idle else 0.0)
+        self._gap = Gap(idle + host_slack if idle else 0.0, ABANDONED + host_slack)
         self._echo = EchoCanceller(echo)
         self._last = self._answer = b""
         self._further: list[bytes] = []  #: answers that follow it
@@ -200,7 +200,7 @@ class SlaveEngine:
         self._last = data[-1:]
         if self._unknown is not None and data:
             self._unknown.received(data, now)
-        if self._gap.passed(now):
+        if self._gap.ended(now):
             self._sort(self._decoder.finish(), now)
         if self._has_turns:
             for byte in data:

@@ -83,6 +83,11 @@ def flipped(bit: int) -> Fault:
     return damage
 
 
+def beginning(size: int) -> Fault:
+    """Only so many bytes arrive, fewer than all."""
+    return lambda data: half(data) if size >= len(data) else Disturbed(data[:size], 0, len(data) - size)
+
+
 def late(seconds: float, byte_time: float) -> Fault:
     """It is complete so long after it could have begun."""
     return lambda data: Disturbed(data, wait=max(0.0, seconds - len(data) * byte_time))
@@ -100,16 +105,20 @@ class Script(FaultPlan):
         answers: what happens to the next transmissions of slaves.
         always: what happens to them after that; None: nothing.
         requests: what happens to the next transmissions of the master.
+        drawn: faults at random besides, None without.
     """
 
     def __init__(self) -> None:
         super().__init__()
+        self.drawn: FaultPlan | None = None
         self.answers: deque[Fault] = deque()
         self.always: Fault | None = None
         self.requests: deque[Fault] = deque()
 
     def disturb(self, data: bytes, now: float, source: str, *, to_master: bool) -> Disturbed | None:
         """Return the disturbed transmission."""
+        if self.drawn is not None:
+            return self.drawn.disturb(data, now, source, to_master=to_master)
         written = self.answers if to_master else self.requests
         fault = written.popleft() if written else self.always if to_master else None
         return None if fault is None else fault(data)
@@ -197,10 +206,17 @@ class Rig:
         return self.wait(self.call(case, **other))
 
     def ask_right(self, case: Case) -> None:
-        """Ask, and compare the answers to those that the slave has made for this request."""
+        """Ask, and compare the answers to those that the slave has made last."""
+        self.check(self.ask(case))
+
+    def ask_own(self, case: Case) -> int:
+        """Ask; all answers must be among those made for this request. Return the size of the longest."""
         for node in self.nodes:
             node.made.clear()
-        self.check(self.ask(case))
+        told = frames_of(self.ask(case))
+        made = {each.to_frame() for node in self.nodes for each in node.made}
+        assert made.issuperset(told)
+        return max(map(len, told))
 
     def check(self, result: Any) -> None:
         """Compare answers to the last ones of the slaves."""

@@ -11,14 +11,23 @@ import pytest
 from qlinkgen.errors import BadReply, LinkError, NoReply
 from qlinkgen.link.codec import Framed
 from qlinkgen.link.events import Failed, Sent, Stray, TimedOut
+from qlinkgen.link.gaps import ABANDONED
+from qlinkgen.sim import FaultPlan
+from qlinkgen.sim.fault_kinds import RateLike
 from qlinkgen.sim.generic import GenericNode
 from tests.bus.cases import ANSWERED, Case, cases_of, numbers_of
-from tests.bus.rig import Rig, Setting, after, both_ask, flipped, half, late, lost
+from tests.bus.rig import Rig, Setting, after, beginning, both_ask, flipped, half, late, lost
 from tests.bus.settings import VIRTUAL, everywhere, rig_for, timed
 from tests.bus.wires import codec_of
 
 #: Bytes of noise: none of them begins a frame of many protocols.
 NOISE = bytes.fromhex("00 55 c3")
+#: Chance of each kind of fault. One bit is changed: two can leave the sum of UBX or an XOR right.
+HIGH = 0.3
+RATES: dict[str, RateLike] = {
+    **dict.fromkeys(("drop", "truncate", "delay", "duplicate", "stray", "noise"), HIGH),
+    "flip": (HIGH, 1, 1),
+}
 
 
 @everywhere
@@ -110,6 +119,42 @@ def test_noise_before_an_answer_costs_a_repeat_at_most(name: str, setting: Setti
             with rig_for(case, setting) as rig:
                 rig.script.answers.append(after(NOISE, gap))
                 rig.ask_right(case)
+                rig.ask_right(case)
+
+
+@timed
+def test_faults_at_random_give_no_wrong_answer(name: str, setting: Setting) -> None:
+    rounds = 20 if setting.client == "blocking" else 4
+    for case in cases_of(name, *ANSWERED, that=lambda case: case.checked):
+        with rig_for(case, setting, attempts=6) as rig:
+            quiet, within = rig.timing.quiet, case.deadline(rig.timing)
+            late = within - rig.ask_own(case) * rig.timing.byte_time
+            others = [*strays(rig.codec, case)]
+            extents = {"late": (HIGH, late, late + quiet / 4), "silent": (HIGH, within, 3 * within)}
+            for kind, rate in {**RATES, **extents}.items():
+                plan = FaultPlan(**{kind: rate}, seed=7, strays=others)  # type: ignore[arg-type]
+                rig.script.drawn, answered = plan, 0
+                if kind == "stray" and not others:
+                    continue
+                for _ in range(rounds):
+                    with suppress(LinkError):
+                        rig.ask_own(case)
+                        answered += 1
+                    rig.master.port.sleep(quiet)  # a copy would pass for the answer to the next request
+                assert answered >= rounds / 4 * case.command.repeat_safe, kind
+            rig.script.drawn = None
+            rig.ask_right(case)
+
+
+@timed
+def test_a_slave_hears_the_next_request_after_part_of_one(name: str, setting: Setting) -> None:
+    for case in cases_of(name, *ANSWERED):
+        with rig_for(case, setting, attempts=1) as rig:
+            for size in range(1, 9):
+                rig.script.requests.append(beginning(size))
+                with suppress(LinkError):
+                    rig.ask(case)
+                rig.master.port.sleep(2 * ABANDONED)
                 rig.ask_right(case)
 
 
