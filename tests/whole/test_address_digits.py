@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from construct import ConstructError
 
 from qlinkgen.backends import python
+from qlinkgen.backends.construct.live import live
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.dissect import dissect
@@ -93,19 +95,23 @@ def test_frames_by_hand(parts: str, frame: bytes) -> None:
     assert codec.decode_response(frame).node == Codec(found).decode(frame, "response").address == 26
 
 
-@pytest.mark.parametrize("digits", [b"1G", b"+1", b"1.", b" 1", b"\xb21"])
-def test_another_character_is_no_frame(digits: bytes) -> None:
-    found = _plan(_DCON)
+@pytest.mark.parametrize("form", ["hex[2]", "decimal[2]"])
+def test_another_character_is_refused(form: str) -> None:
+    found = _plan(_DCON.replace("hex[2]", form, 1))
     codec, right = python.load(found.protocol), Codec(found).encode("speed.response", {"speed": 1}, 1)
-    wrong = right[:1] + digits + right[3:]
-    with pytest.raises(BadFrame, match="frame"):
-        Codec(found).decode(wrong, "response")
-    with pytest.raises(codec.DecodeError) as raised:
-        codec.decode_response(wrong)
-    assert raised.value.kind == "frame"
-    cut = dissect(found, wrong, "response")
-    assert cut.kind == "frame"
-    assert cut.address is None
+    reader = live(found.protocol).frames["response"]
+    assert reader.parse(right)["node"] == 1
+    for digits in (b"1G", b"+1", b"1.", b" 1", b"\xb21"):
+        wrong = right[:1] + digits + right[3:]
+        with pytest.raises(BadFrame, match="frame"):
+            Codec(found).decode(wrong, "response")
+        with pytest.raises(codec.DecodeError) as raised:
+            codec.decode_response(wrong)
+        assert raised.value.kind == "frame"
+        with pytest.raises(ConstructError, match="node is"):
+            reader.parse(wrong)
+        cut = dissect(found, wrong, "response")
+        assert (cut.kind, cut.address) == ("frame", None)
 
 
 def test_a_receiver_does_not_wait_for_a_frame_with_a_wrong_digit() -> None:
