@@ -13,7 +13,8 @@ from qlinkgen.errors import Refused
 from qlinkgen.link import Dialogue, MasterEngine, Monitor, Refusal, Timing
 from qlinkgen.link.events import Damaged
 from qlinkgen.link.monitor import Asked, Replied
-from tests.library.protocols import described, peer
+from tests.bus.wires import codec_of
+from tests.library.protocols import peer
 from tests.library.test_live import PATIENCE, serving
 
 #: The commands that the devices have; a checksum of the memory is not among them.
@@ -47,11 +48,13 @@ class Chip:
 class Loader:
     """The handlers of a slave for a chip, of the generated messages."""
 
+    number = 0  # frames have no address
+
     def __init__(self, codec: Any, chip: Chip, codes: list[int]) -> None:
         self._codec, self._chip, self._codes = codec, chip, codes
         self._ack = codec.Ack()
 
-    def __call__(self, request: Any) -> Any:
+    def handle(self, request: Any, now: float) -> Any:
         return getattr(self, type(request).__name__.removesuffix("Request"))()
 
     def _placed(self, place: Any, size: int) -> Any:
@@ -109,9 +112,9 @@ def test_stm32loader_writes_and_reads_a_device(*, extended: bool) -> None:
     peer("stm32")
     from stm32loader.bootloader import CommandError, Stm32Bootloader
 
-    chip, codec = Chip(), described("stm32").module
+    chip, codec = Chip(), codec_of("stm32")
     codes = [0x44 if code == 0x43 and extended else code for code in CODES]
-    with serving("stm32", 0, Loader(codec, chip, codes)) as pty, serial.Serial(pty.path) as port:
+    with serving("stm32", Loader(codec, chip, codes)) as pty, serial.Serial(pty.path) as port:
         port.timeout = PATIENCE
         loader = Stm32Bootloader(port, verbosity=0)
         assert loader.get() == 0x31
@@ -239,7 +242,7 @@ def transact(engine: MasterEngine, port: Port, request: Any, *further: Any) -> A
 
 
 def test_our_master_writes_and_reads_a_device() -> None:
-    codec: Any = described("stm32").module
+    codec = codec_of("stm32")
     chip, timing = Chip(), Timing.of(codec, host_slack=0.002)
     monitor = Monitor(codec, timing)
     port, engine = Port(Device(chip), monitor), MasterEngine(codec, timing)
