@@ -15,6 +15,7 @@ from qlinkgen.schema.file_commands import AnswerSpec, CommandSpec, RepeatSpec, R
 from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kind_messages import AnyMessages, KindMessages
+from qlinkgen.schema.kind_names import message_kind, response_kind
 from qlinkgen.schema.kinds import Label
 from qlinkgen.schema.layouts import fields_of, fields_path
 from qlinkgen.schema.many import ManyBuilder
@@ -250,7 +251,7 @@ class CommandBuilder:
             request or {},
             place,
             separator=spec.separator,
-            kind=spec.frame or defaults.frame,
+            kind=message_kind(self._file, spec.frame),
         )
         asked = build(name, spec, written, addressing=addressing, section=section)
         self.messages.append(asked)
@@ -282,7 +283,7 @@ class CommandBuilder:
             fields or {},
             fields_path(given, place),
             separator=self._separator(spec),
-            kind=self._answer_kind(spec),
+            kind=response_kind(self._file, spec),
             inherited=number.relative,
         )
         return given if isinstance(given, str) else fields, written
@@ -296,17 +297,6 @@ class CommandBuilder:
             common.separator if isinstance(common, AnswerSpec) else None,
         )
         return next((each for each in stated if each is not None), None)
-
-    def _answer_kind(self, spec: CommandSpec) -> str | None:
-        """The kind of frame of a response: the nearest that is stated."""
-        own, common = spec.response, self._file.defaults.response
-        stated = (
-            own.frame if isinstance(own, AnswerSpec) else None,
-            spec.frame,
-            common.frame if isinstance(common, AnswerSpec) else None,
-            self._file.defaults.frame,
-        )
-        return next((kind for kind in stated if kind is not None), None)
 
     def _named_response(self, name: str, path: Path) -> Message | None:
         """The message that is the response of a command."""

@@ -8,46 +8,17 @@ from dataclasses import replace
 
 from qlinkgen.model.frame import DelimitedFrame, Direction, FrameKind, FrameKinds, Part, PartBits
 from qlinkgen.model.message import Message
-from qlinkgen.schema.file_commands import AnswerSpec, StepMessageSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.frames import FrameBuilder
+from qlinkgen.schema.kind_names import named_kinds
 from qlinkgen.schema.layouts import own_steps
-from qlinkgen.schema.notation import shown
 from qlinkgen.schema.part_directions import stated_direction
-from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 
 _RULE = "bad-kinds"
 #: Size up to which only answers may have a frame without a check value.
 _SHORT = 2
-
-
-def named_kinds(file: SchemaFile) -> Iterator[tuple[str, Path]]:
-    """The names of kinds that commands and messages state, with their places."""
-    answers: list[tuple[object, Path]] = [(file.defaults.response, ("defaults", "response"))]
-    answers += [(spec.response, ("commands", name, "response")) for name, spec in file.commands.items()]
-    stated: list[tuple[str | None, Path]] = [(file.defaults.frame, ("defaults",))]
-    stated += [(spec.frame, path) for spec, path in answers if isinstance(spec, AnswerSpec)]
-    for group in ("replies", "commands", "messages"):
-        stated += [(spec.frame, (group, name)) for name, spec in getattr(file, group).items()]
-    for name, command in file.commands.items():
-        path: Path = ("commands", name)
-        stated += [(spec.frame, (*path, "replies", key)) for key, spec in command.replies.items()]
-        for index, step in enumerate(command.steps or ()):
-            for key, message in (("send", step.send), ("receive", step.receive)):
-                if isinstance(message, StepMessageSpec):
-                    stated.append((message.frame, (*path, "steps", index, key)))
-    yield from ((kind, (*path, "frame")) for kind, path in stated if kind is not None)
-
-
-def check_kind_names(file: SchemaFile, report: Reporter) -> None:
-    """Check that the kinds of frame that commands and messages name exist."""
-    for name, path in named_kinds(file):
-        if name not in file.frames:
-            hint = did_you_mean(name, file.frames, f"the kinds are {listed(file.frames)}")
-            if not file.frames:
-                hint = "remove it; the protocol has one kind of frame"
-            report.error(_RULE, path, f"unknown kind of frame {shown(name)}", hint)
 
 
 def build_kinds(file: SchemaFile, builder: FrameBuilder, report: Reporter) -> FrameKinds | None:

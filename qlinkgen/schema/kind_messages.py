@@ -11,8 +11,9 @@ from qlinkgen.schema.fields import FieldBuilder
 from qlinkgen.schema.file_base import Fact
 from qlinkgen.schema.file_commands import CommandSpec, MessageSpec
 from qlinkgen.schema.file_model import SchemaFile
-from qlinkgen.schema.frame_kinds import family_frame, named_kinds
+from qlinkgen.schema.frame_kinds import family_frame
 from qlinkgen.schema.frames import payload_bounds
+from qlinkgen.schema.kind_names import message_kind, named_kinds
 from qlinkgen.schema.messages import MessageBuilder, Written, sent_by
 from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
@@ -92,7 +93,7 @@ class KindMessages:
     def single(self, name: str, spec: MessageSpec) -> Message:
         """A message without a response."""
         direction = sent_by(self._file, spec)
-        kind = spec.frame or self._file.defaults.frame
+        kind = message_kind(self._file, spec.frame)
         return self._of(kind, ("messages", name), direction, name).single(name, spec)
 
     def _of(self, kind: str | None, path: Path, direction: Direction, whose: str) -> MessageBuilder:

@@ -16,10 +16,11 @@ from qlinkgen.schema.commands import CommandBuilder, build_bus
 from qlinkgen.schema.echoes import EchoBuilder
 from qlinkgen.schema.examples import build_examples
 from qlinkgen.schema.fields import FieldBuilder
-from qlinkgen.schema.frame_kinds import begun, build_kinds, check_kind_names, check_used
+from qlinkgen.schema.frame_kinds import begun, build_kinds, check_used
 from qlinkgen.schema.frames import FrameBuilder, payload_bounds
 from qlinkgen.schema.including import include
 from qlinkgen.schema.kind_messages import message_builder
+from qlinkgen.schema.kind_names import check_kind_names
 from qlinkgen.schema.names import check_names
 from qlinkgen.schema.notation import Version
 from qlinkgen.schema.notation import version as as_version

@@ -12,6 +12,7 @@ from qlinkgen.model.types import Enum, Float, Scalar
 from qlinkgen.schema.file_commands import AnswerSpec, Means, MeansSpec, MessageSpec, ReplySpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kind_messages import AnyMessages
+from qlinkgen.schema.kind_names import reply_kind
 from qlinkgen.schema.messages import Written
 from qlinkgen.schema.notation import AnswerId, Duration, Wanted, shown, wanted
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -178,14 +179,8 @@ class ReplyBuilder:
 
     def _kind(self, command: str, written: OfCommand) -> str | None:
         """The kind of frame of a reply: the nearest that is stated."""
-        own, common = self._file.commands[command], self._file.defaults.response
-        stated = (
-            written.spec.frame,
-            None if written.shared else own.frame,
-            common.frame if isinstance(common, AnswerSpec) else None,
-            self._file.defaults.frame,
-        )
-        return next((kind for kind in stated if kind is not None), None)
+        owner = None if written.shared else self._file.commands[command]
+        return reply_kind(self._file, written.spec, owner)
 
     def outcome(self, command: str, response: Message | None) -> Reply | None:
         """What the response of a command means, None if it always answers the request."""

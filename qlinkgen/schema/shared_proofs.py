@@ -9,10 +9,11 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from qlinkgen.schema.file_commands import AnswerSpec, CommandSpec, StepMessageSpec, StepSpec
+from qlinkgen.schema.file_commands import CommandSpec, StepMessageSpec, StepSpec
 from qlinkgen.schema.file_fields import Fields, FieldSpec
 from qlinkgen.schema.file_frames import PartSpec
 from qlinkgen.schema.file_model import SchemaFile
+from qlinkgen.schema.kind_names import response_kind, step_kind
 from qlinkgen.schema.notation import REPEATED
 
 #: Keys of the part that the field has.
@@ -71,17 +72,10 @@ def _longer(payload: PartSpec, check: PartSpec) -> PartSpec:
 def _command(file: SchemaFile, spec: CommandSpec, found: Mapping[str, _Shared]) -> CommandSpec:
     """A command, the responses of which have the check value of their kind."""
     if spec.steps is not None:
-        usual = spec.frame or file.defaults.frame
-        return spec.model_copy(update={"steps": [_step(each, found, usual) for each in spec.steps]})
+        return spec.model_copy(update={"steps": [_step(file, spec, each, found) for each in spec.steps]})
     own, common = spec.response, file.defaults.response
     given = common if own is None else own
-    stated = (
-        own.frame if isinstance(own, AnswerSpec) else None,
-        spec.frame,
-        common.frame if isinstance(common, AnswerSpec) else None,
-        file.defaults.frame,
-    )
-    shared = found.get(next((each for each in stated if each is not None), ""))
+    shared = found.get(response_kind(file, spec) or "")
     if shared is None or given is None or isinstance(given, str):
         return spec
     if isinstance(given, dict):
@@ -93,11 +87,13 @@ def _command(file: SchemaFile, spec: CommandSpec, found: Mapping[str, _Shared]) 
     )
 
 
-def _step(step: StepSpec, found: Mapping[str, _Shared], usual: str | None) -> StepSpec:
+def _step(file: SchemaFile, command: CommandSpec, step: StepSpec, found: Mapping[str, _Shared]) -> StepSpec:
+    """A step, which has the check value of the kind that it receives."""
     given = step.receive
     if given is None or isinstance(given, str):
         return step
-    shared = found.get((given.frame if isinstance(given, StepMessageSpec) else None) or usual or "")
+    own = given.frame if isinstance(given, StepMessageSpec) else None
+    shared = found.get(step_kind(file, own, command) or "")
     if shared is None:
         return step
     if isinstance(given, StepMessageSpec):

@@ -12,6 +12,7 @@ from qlinkgen.schema.file_commands import CommandSpec, StepMessageSpec, StepSpec
 from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kind_messages import AnyMessages
+from qlinkgen.schema.kind_names import step_kind
 from qlinkgen.schema.layouts import OwnStep, own_steps
 from qlinkgen.schema.messages import Written
 from qlinkgen.schema.notation import AnswerId, shown
@@ -212,7 +213,7 @@ class StepBuilder:
             step.fields_path,
             items,
             asked.spec.separator if own.separator is None else own.separator,
-            kind=own.frame or asked.spec.frame or self._file.defaults.frame,
+            kind=step_kind(self._file, own.frame, asked.spec),
             inherited=number.relative,
         )
         direction: Literal["request", "response"] = "request" if sent else "response"
