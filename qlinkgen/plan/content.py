@@ -117,9 +117,10 @@ def pack(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
 
 def _pack_separated(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
     texts = []
+    counts = {run.name: _count(run, values[run.name]) for run in plan.runs if isinstance(run, ItemsStep)}
     for step in plan.steps:
         absent = step.presence is not None and values[step.name] is None
-        texts.append(b"" if absent else _packed(step, values, {}))
+        texts.append(b"" if absent else _packed(step, values, counts))
     return joined(plan, texts)
 
 

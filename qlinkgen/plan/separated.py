@@ -9,12 +9,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from qlinkgen.plan import walk
-from qlinkgen.plan.payload import BytesStep, ConstantStep, ItemsStep, PayloadPlan, ReservedStep, ValueStep
+from qlinkgen.plan.payload import (
+    BytesStep,
+    ConstantStep,
+    CountStep,
+    ItemsStep,
+    PayloadPlan,
+    ReservedStep,
+    ValueStep,
+)
 from qlinkgen.plan.walk import Visit, Wrong
 
 _NONE: Mapping[str, object] = {}
 #: The steps that texts between separators can be.
-TextStep = ValueStep | ConstantStep | ReservedStep | BytesStep | ItemsStep
+TextStep = ValueStep | ConstantStep | ReservedStep | CountStep | BytesStep | ItemsStep
 
 
 def text_steps(plan: PayloadPlan) -> tuple[TextStep, ...]:
@@ -58,6 +66,11 @@ def texts_behind(plan: PayloadPlan) -> int:
     """Number of texts after the open list, all of which are needed; 0 if it is the last step."""
     steps, opened = text_steps(plan), open_list(plan)
     return sum(map(greatest_texts, steps[steps.index(opened) + 1 :])) if opened else 0
+
+
+def counts_of(plan: PayloadPlan, run: ItemsStep) -> tuple[CountStep, ...]:
+    """The steps before a list that tell how many items it has."""
+    return tuple(step for step in plan.steps if isinstance(step, CountStep) and step.run == run.name)
 
 
 def skipped(plan: PayloadPlan) -> ItemsStep | None:
@@ -107,7 +120,12 @@ def visit(plan: PayloadPlan, payload: bytes, beside: Mapping[str, object] = _NON
         raise Wrong("", 0)
     if plan.leading:
         texts, at = texts[1:], min(1, len(payload))
-    behind = texts_behind(plan)
+    yield from _visit_texts(plan, texts, at, len(payload))
+
+
+def _visit_texts(plan: PayloadPlan, texts: list[bytes], at: int, end: int) -> Iterator[Visit]:
+    """The steps of texts, the first of which is at an offset of a payload of ``end`` bytes."""
+    behind, told = texts_behind(plan), dict[str, tuple[int, bytes]]()
     for step in text_steps(plan):
         own = _taken(step, texts, behind)
         texts = texts[len(own) :]
@@ -121,4 +139,18 @@ def visit(plan: PayloadPlan, payload: bytes, beside: Mapping[str, object] = _NON
                 if not least <= len(text) <= most:
                     raise Wrong(step.name, at)
                 yield Visit(step, at, text)
-            at = min(at + len(text) + 1, len(payload))
+            if isinstance(step, CountStep):
+                told[step.name] = at, text
+            at = min(at + len(text) + 1, end)
+        if isinstance(step, ItemsStep):
+            _check_told(plan, step, len(own), told)
+
+
+def _check_told(
+    plan: PayloadPlan, run: ItemsStep, number: int, told: Mapping[str, tuple[int, bytes]]
+) -> None:
+    """Check the counts of a list, whose places and texts are ``told``. Raises Wrong."""
+    for count in counts_of(plan, run):
+        at, text = told[count.name]
+        if not count.integer.stray(text) and count.integer.unpack(text) != number:
+            raise Wrong(count.name, at)

@@ -84,7 +84,10 @@ class FieldBuilder:
     def _check_text(self, kind: FieldType, path: Path) -> None:
         """Check that a receiver finds the end of a number as text."""
         number = kind.item if isinstance(kind, Array) else kind
-        if isinstance(number, Scalar) and number.text and not number.text.fixed:
+        if isinstance(number, Scalar) and number.text and isinstance(number.role, Count):
+            what = f"{path[-1]} is a count as text, which only messages with a separator have"
+            self._report.error("bad-digits", path, what, "remove as", of_key=True)
+        elif isinstance(number, Scalar) and number.text and not number.text.fixed:
             text = number.text
             what = f"the text of {path[-1]} has {text.least} to {text.most} characters"
             hint = "use words of one length, or a separator"

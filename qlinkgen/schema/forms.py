@@ -37,7 +37,7 @@ def formed(scalar: Scalar, spec: FieldSpec, base: str, location: Location, *, gr
     if spec.pad is not None and (spec.pad != b" " or not spec.as_.startswith("decimal[")):
         what = "only spaces (pad: 20) fill up a number, one of as: decimal[6]"
         location.key_fault("bad-digits", "pad", what, "remove it, or write pad: 20")
-    if spec.counts is not None or spec.groups or grouped:
+    if spec.groups or grouped or (spec.counts is not None and not spec.as_.startswith(("decimal", "hex"))):
         location.reject(spec, ("as",), "a count" if spec.counts else "groups of bits")
     elif spec.packed is not None:
         pass  # reported with the bits in a row

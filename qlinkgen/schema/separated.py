@@ -10,7 +10,7 @@ from qlinkgen.model.frame import DelimitedFrame, Frame
 from qlinkgen.model.integer import TextForm
 from qlinkgen.model.message import Message
 from qlinkgen.model.scientific import Scientific
-from qlinkgen.model.types import Array, Blob, Scalar
+from qlinkgen.model.types import Array, Blob, Count, Scalar
 from qlinkgen.model.words import Words
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter
@@ -29,6 +29,7 @@ def separated(
         excluded += end.constant if end else b""
     barred = bytes(sorted(each for each in {*excluded} if each < 0x80))
     _check_open(fields, path, report)
+    _check_counts(fields, path, report)
     return tuple(_checked(field, separator, barred, (*path, field.name), report) for field in fields)
 
 
@@ -111,14 +112,25 @@ def _check_open(fields: Sequence[Field], path: Path, report: Reporter) -> None:
         opened = opened or field.name
 
 
+def _check_counts(fields: Sequence[Field], path: Path, report: Reporter) -> None:
+    """Check that a count tells the number of items of a list."""
+    kinds = {field.name: field.type for field in fields}
+    for field in fields:
+        kind = field.type
+        if not isinstance(kind, Scalar) or not isinstance(role := kind.role, Count):
+            continue
+        plain = role.unit == "items" and (role.scale, role.offset) == (1, 0)
+        if not plain or not isinstance(kinds.get(role.run), Array) or kind.signed:
+            what = f"{field.name} is not the number of items of a list"
+            hint = "use an unsigned integer without scale and offset, and count the items of a list after it"
+            report.error(_RULE, (*path, field.name), what, hint, of_key=True)
+
+
 def _listed(field: Field, kind: Array, separator: bytes, path: Path, report: Reporter) -> Field:
     """A list of texts."""
     if isinstance(kind.item.text, Scientific):
         what = f"{field.name} is a list of floating-point numbers as text"
         report.error(_RULE, path, what, "use a field for each, or as: decimal with a scale", of_key=True)
-    if kind.length.counted_by:
-        what = f"the number of {field.name} follows from the separators"
-        report.error(_RULE, path, what, "remove the count, and write [0..N]", of_key=True)
     if field.optional:
         what = f"{field.name} is a list, which is not optional"
         report.error(_RULE, (*path, "optional"), what, "put it last, and write [0..N]", of_key=True)

@@ -147,11 +147,6 @@ def test_wrong_keys(field: str, text: str) -> None:
     assert text in [f"{fault.message}; {fault.hint}" for fault in faults_of(f"{{a: {field}}}")]
 
 
-def test_a_count_is_binary() -> None:
-    (fault,) = faults_of('{n: {type: u8, as: "decimal[2]", counts: a}, a: bytes}')
-    assert (fault.rule, fault.message) == ("not-applicable", "'as' has no effect on a count")
-
-
 def test_spaces_fill_up_a_number() -> None:
     fields = """{
       weight: {type: i32, as: "decimal[9]", scale: 1/1000, pad: 20},

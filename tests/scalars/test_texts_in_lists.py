@@ -55,6 +55,12 @@ messages:
     id: ONE
     separator: {before: " "}
     fields: {levels: {type: "u8[0..3]", as: decimal}, mode: mode}
+  cnt:
+    id: CNT
+    fields:
+      number: {type: u8, as: decimal, range: 0..3}
+      levels: {type: "u8[number]", as: decimal}
+      modes: "mode[2]"
 """
 
 
@@ -86,6 +92,8 @@ def codec(protocol: Protocol) -> Any:
         ("top", {}, b""),
         ("top", {"levels": [7]}, b"7,"),
         ("top", {"levels": [7, 0, 255], "unit": "V"}, b"7,0,255,V"),
+        ("cnt", {"modes": [0, 0]}, b"0,OFF,OFF"),
+        ("cnt", {"levels": [7, 0, 255], "modes": [2, 1]}, b"3,7,0,255,AUTO,ON"),
         ("one", {}, b" OFF"),
         ("one", {"levels": [1, 2, 3], "mode": 1}, b" 1 2 3 ON"),
     ],
@@ -152,6 +160,11 @@ def test_sizes(protocol: Protocol) -> None:
         ("mid", b"ab,,ON,OFF,", ("length", "levels")),
         ("mid", b"ab,1,x,ON,OFF,", ("range", "levels")),
         ("mid", b"ab,1,2,ON,NO,", ("range", "modes")),
+        ("cnt", b"1,OFF,OFF", ("length", "number")),
+        ("cnt", b"1,7,8,OFF,OFF", ("length", "number")),
+        ("cnt", b"x,7,OFF,OFF", ("range", "number")),
+        ("cnt", b",7,OFF,OFF", ("length", "number")),
+        ("cnt", b"1,x,OFF,OFF", ("range", "levels")),
         ("top", b",V", ("length", "levels")),
         ("top", b"1,2,3,4,V", ("length", "")),
     ],

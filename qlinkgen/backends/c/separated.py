@@ -15,10 +15,19 @@ from qlinkgen.model import naming
 from qlinkgen.model.integer import Integer, TextForm
 from qlinkgen.model.words import Words
 from qlinkgen.plan.expr import Within
-from qlinkgen.plan.payload import BytesStep, ConstantStep, ItemsStep, PayloadPlan, ReservedStep, ValueStep
+from qlinkgen.plan.payload import (
+    BytesStep,
+    ConstantStep,
+    CountStep,
+    ItemsStep,
+    PayloadPlan,
+    ReservedStep,
+    ValueStep,
+)
 from qlinkgen.plan.separated import (
     TextStep,
     characters,
+    counts_of,
     greatest_texts,
     most_texts,
     needed,
@@ -39,7 +48,7 @@ def size_lines(payload: PayloadPlan, layouts: Layouts) -> list[str]:
         own = (
             _list_size(step, layouts, separators=step is empty)
             if isinstance(step, ItemsStep)
-            else [f"size += {_size(step, layouts)};"]
+            else [f"size += {_size(step, payload, layouts)};"]
         )
         if index >= least:
             # The separators before it, of which those before the last field needed are counted.
@@ -71,7 +80,7 @@ def constant_size(payload: PayloadPlan) -> int:
     return sum(len(step.integer.pack(step.value)) for step in steps) + most_texts(payload) - 1
 
 
-def _size(step: TextStep, layouts: Layouts) -> str:
+def _size(step: TextStep, payload: PayloadPlan, layouts: Layouts) -> str:
     """The number of characters of a text in a struct."""
     match step:
         case ConstantStep() | ReservedStep():
@@ -80,11 +89,11 @@ def _size(step: TextStep, layouts: Layouts) -> str:
             return f"{step.length.maximum}U"
         case BytesStep():
             return f"(size_t)message->{step.name}_{step.quantity}"
-        case ValueStep():
+        case ValueStep() | CountStep():
             digits = _digits(step.integer)
             if digits.fixed:
                 return f"{digits.most}U"
-            return layouts.text("size", step.integer, digits, _value(step))
+            return layouts.text("size", step.integer, digits, _value(step, payload))
         case ItemsStep():
             raise AssertionError(f"{step.name} has a size for each item")
         case _:
@@ -95,7 +104,9 @@ def _if(condition: str, lines: list[str]) -> list[str]:
     return [f"if ({condition}) {{", *(f"    {line}" for line in lines), "}"]
 
 
-def _value(step: ValueStep) -> str:
+def _value(step: ValueStep | CountStep, payload: PayloadPlan) -> str:
+    if isinstance(step, CountStep):
+        return f"message->{step.run}_{payload.run(step.run).quantity}"
     return checks.as_unsigned(step.number, f"message->{naming.member(step.name)}")
 
 
@@ -205,12 +216,14 @@ class SeparatedEncoder(Encoder):
             return [*lines, *onward(count if step.fixed else local_size(step.name))]
         digits = _digits(step.integer)
         if digits.fixed:
-            put = self.layouts.text("put", step.integer, digits, "payload", f"{digits.most}U", _value(step))
+            put = self.layouts.text(
+                "put", step.integer, digits, "payload", f"{digits.most}U", _value(step, self.payload)
+            )
             return [f"{put};", *onward(f"{digits.most}U")]
-        put = self.layouts.text("put", step.integer, digits, "payload", "length", _value(step))
+        put = self.layouts.text("put", step.integer, digits, "payload", "length", _value(step, self.payload))
         if last and isinstance(digits, Words):
             return [f"{put};"]
-        return ["{", f"    const size_t length = {_size(step, self.layouts)};", f"    {put};",
+        return ["{", f"    const size_t length = {_size(step, self.payload, self.layouts)};", f"    {put};",
                 *(f"    {line}" for line in onward("length")), "}"]  # fmt: skip
 
     def _list(self, step: ItemsStep, *, last: bool) -> list[str]:
@@ -294,6 +307,9 @@ class SeparatedDecoder(Decoder):
         self._assign(target, step.number, self._number(step.item))
         body = [f"length = {self.layouts.cells()}_text_size_(payload, size, {separator});", *self._flushed()]
         lines = [*head, *loop(count, [*body, *_ONWARD])]
+        told = [f"{each.name}_told != (uint64_t){count}" for each in counts_of(self.payload, step)]
+        self.refuse(told, "LENGTH")
+        lines += self._flushed()
         return lines if step.fixed else ["{", *(f"    {line}" for line in lines), "}"]
 
     def _led(self, separator: str) -> list[str]:
@@ -317,6 +333,9 @@ class SeparatedDecoder(Decoder):
                 pass
             case ConstantStep():
                 self.refuse([other_than(step, self._number(step.integer))], "RANGE")
+            case CountStep():
+                number = self._number(step.integer)
+                self.lines.append(f"const uint64_t {step.name}_told = (uint64_t){number};")
             case ValueStep():
                 self._assign(target, step.number, self._number(step.integer))
             case BytesStep():

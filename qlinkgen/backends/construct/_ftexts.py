@@ -30,7 +30,7 @@ from construct import (
     stream_write,
 )
 
-from ._fields import Message, Row, TextField, Values, _innermost
+from ._fields import Count, Message, Row, TextField, Values, _innermost
 
 _DECIMAL = re.compile(rb"[+-]?([0-9]*)\.?([0-9]*)\Z")
 _REAL = re.compile(rb"[+-]?(?=\.?[0-9])([0-9]*)\.?([0-9]*)(?:[Ee]([+-]?[0-9]+))?\Z")
@@ -353,12 +353,8 @@ class Separated(Message):
         texts = stream_read_entire(stream, path).split(self.separator)
         if self.leading and texts.pop(0):
             raise RangeError(f"no separator begins {self.name}", path=path)
-        most = sum(_counts(field)[1] for field in self.fields)
-        needed = sum(_counts(field)[0] for field in self.fields[: self.needed])
-        if not max(needed, 1 - self.leading) <= len(texts) <= most:
-            raise RangeError(f"{len(texts)} texts in {self.name}", path=path)
-        texts = self._by_field(texts)
-        values = Container()
+        texts = self._by_field(texts, path)
+        values, told = Container(), dict[str, int]()
         for field, text in zip(self.fields, texts, strict=True):
             if not text and field.name in self.optional:
                 values[field.name] = None
@@ -371,17 +367,26 @@ class Separated(Message):
             found = field.parse(text, number=len(text))
             if isinstance(field.subcon, Default):
                 values[field.name] = found
+            if isinstance(field.subcon, Count):
+                told[field.subcon.of] = found
+            if field.name in told and told[field.name] != len(found):
+                wrong = f"{told[field.name]} is not the number of {field.name}"
+                raise RangeError(wrong, path=path)
         return values
 
-    def _by_field(self, texts: list[bytes]) -> list[bytes]:
+    def _by_field(self, texts: list[bytes], path: str) -> list[bytes]:
         """The texts of each field, those of a list with their separators."""
+        most = sum(_counts(field)[1] for field in self.fields)
+        needed = sum(_counts(field)[0] for field in self.fields[: self.needed])
+        if not max(needed, 1 - self.leading) <= len(texts) <= most:
+            raise RangeError(f"{len(texts)} texts in {self.name}", path=path)
         cells = []
         for i, field in enumerate(self.fields):
             number = min(_counts(field)[1], len(texts))
             if i == self.opened and self.behind:
                 number = len(texts) - self.behind
                 if texts[:number] == [b""]:
-                    raise RangeError(f"{field.name} has an empty item")
+                    raise RangeError(f"{field.name} has an empty item", path=path)
             cells.append(self.separator.join(texts[:number]))
             del texts[:number]
         return cells

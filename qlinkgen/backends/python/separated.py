@@ -13,10 +13,11 @@ from qlinkgen.backends.python.walked import WalkedDecoder, WalkedEncoder
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.types import Float
 from qlinkgen.plan.expr import Size, Within
-from qlinkgen.plan.payload import BytesStep, ConstantStep, ItemsStep, ReservedStep, ValueStep
+from qlinkgen.plan.payload import BytesStep, ConstantStep, CountStep, ItemsStep, ReservedStep, ValueStep
 from qlinkgen.plan.separated import (
     TextStep,
     characters,
+    counts_of,
     greatest_texts,
     most_texts,
     needed,
@@ -62,6 +63,9 @@ class SeparatedEncoder(WalkedEncoder):
         match step:
             case ConstantStep() | ReservedStep():
                 return [f"{local} = {literal(step.integer.pack(step.value))}"]
+            case CountStep():
+                number = f"len(self.{attribute(step.run)})"
+                return [f"{local} = {integers.to_bytes(step.integer, number)}"]
             case ItemsStep():
                 return [*self._list(step), *self._flushed(), self._joined(step)]
             case BytesStep():
@@ -185,7 +189,10 @@ class SeparatedDecoder(WalkedDecoder):
             *self._flushed(),
             *wrapped(f"{target}.append(", [item], ")", 12),
         ]
-        return [*head, f"{target} = []", f"for at, {text} in enumerate({local}):", *indented(body)]
+        lines = [*head, f"{target} = []", f"for at, {text} in enumerate({local}):", *indented(body)]
+        for count in counts_of(self.message.payload, step):
+            lines += [f"if {count.name}_raw != len({local}):", self._bad_layout]
+        return lines
 
     def _text(self, step: TextStep, offset: str) -> list[str]:
         local, target = f"{step.name}_text", f"message.{attribute(step.name)}"
@@ -195,9 +202,9 @@ class SeparatedDecoder(WalkedDecoder):
         match step:
             case ReservedStep():
                 return lines
-            case ConstantStep():
+            case ConstantStep() | CountStep():
                 raw = self._read(step.integer, step.name, offset)
-                for rule in step.conditions:
+                for rule in () if isinstance(step, CountStep) else step.conditions:
                     self._refuse(integers.broken(rule, raw), step.name, raw, offset)
             case ValueStep() if isinstance(kind := step.number.meaning, Float):
                 self._real(step, kind, target, offset)

@@ -400,6 +400,8 @@ def _spoilt_simple(step: SimpleStep, data: bytes) -> Iterator[tuple[str, int, by
     match step:
         case ValueStep() | ConstantStep():
             yield from _beside(step.name, step.integer, step.conditions)
+        case CountStep() if step.integer.text:
+            yield from _beside(step.name, step.integer, ())
         case CountStep():
             number = step.integer.unpack(data[: step.integer.size])
             yield from _beside(step.name, step.integer, (Within(number, number),))

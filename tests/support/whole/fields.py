@@ -16,6 +16,8 @@ Doc = dict[str, Any]
 _INTEGERS = ("u8", "u8", "i8", "u16", "i16", "u24", "i24", "u32", "i32", "u40", "i48", "u56", "u64", "i64")
 #: Maximum number of characters of a floating-point number.
 _REAL = 24
+#: Maximum characters of a count as text.
+_TOLD = 5
 #: Maximum number of records inside each other.
 _DEPTH = 3
 _SCALES = (("1/10", 10), ("1/2^8", 256), ("0.5", 2), ("5", 1), ("-1/4", 4), ("1/1000", 1000), ("1/3", 3))
@@ -591,7 +593,7 @@ class FieldMaker:
                 made[self.words.name(taken)] = spec
                 room.left -= size + 1
         self._opened(made)
-        return self._opened_before(self._with_real(made, room, taken))
+        return self._told(self._opened_before(self._with_real(made, room, taken)), room, taken)
 
     def _with_real(self, made: Doc, room: Room, taken: set[str]) -> Doc:
         """Perhaps one more field, of a floating-point number."""
@@ -633,6 +635,24 @@ class FieldMaker:
         name, _, number = made[chosen]["type"].partition("[")
         made[chosen]["type"] = f"{name}[{rng.choice((0, 0, 1))}..{number}"
         return made
+
+    def _told(self, made: Doc, room: Room, taken: set[str]) -> Doc:
+        """Perhaps a count before a list of varying length."""
+        # Drawn from another source: the schemas of earlier seeds stay what they are.
+        rng, names = random.Random(repr(self.rng.getstate())), list(made)
+        lists = [name for name in names if ".." in made[name]["type"] and "1..1]" not in made[name]["type"]]
+        lists = [name for name in lists if not made[name]["type"].startswith("text")]
+        name = next(each for each in ("number", "number_2", "number_3") if each not in taken)
+        if not lists or room.left <= _TOLD or rng.random() < 0.5:
+            return made
+        counted = rng.choice(lists)
+        forms = ("decimal", "decimal[1..3]", "decimal[2]", "hex[1..2]", "hex[4]")
+        spec = {"type": rng.choice(("u8", "u16")), "as": rng.choice(forms), "counts": counted}
+        taken.add(name)
+        room.left -= _TOLD + 1
+        at = rng.randint(0, names.index(counted))
+        before, after = ({each: made[each] for each in part} for part in (names[:at], names[at:]))
+        return {**before, name: spec, **after}
 
     def _dated(self, made: list[tuple[str, Any]], taken: set[str]) -> list[tuple[str, Any]]:
         """Some fields begin with a version of the protocol, and others have ended before the newest one."""

@@ -142,6 +142,7 @@ def _between(message: Message, payload: bytes) -> dict[str, Raw]:
     if not max(least, 0 if message.leading else 1) <= len(texts) <= most:
         raise Wrong("length", f"{len(texts)} texts")
     values: dict[str, Raw] = {}
+    told: dict[str, int] = {}
     for index, slot in enumerate(message.slots):
         kind = slot.kind
         if isinstance(kind, Run) and kind.item:
@@ -150,6 +151,12 @@ def _between(message: Message, payload: bytes) -> dict[str, Raw]:
             own, texts = texts[:number], texts[number:]
             none = own == [b""] and not kind.low and not after
             values[slot.name] = [] if none else _list(slot, kind.item, own)
+            if any(
+                told[each.name] != (0 if none else len(own))
+                for each in message.slots
+                if each.counts == slot.name
+            ):
+                raise Wrong("length", "a count")
             continue
         text, texts = (texts or [b""])[0], texts[1:]
         if slot.optional and not text:
@@ -159,6 +166,8 @@ def _between(message: Message, payload: bytes) -> dict[str, Raw]:
         if not least <= len(text) <= most:
             raise Wrong("length", slot.name)
         values |= _decoded(slot, text, len(text))
+        if isinstance(kind, Number) and slot.counts:
+            told[slot.name] = _get(kind, text)
         if isinstance(kind, Run) and any(each in message.barred for each in text):
             raise Wrong("range", slot.name)
     return values
@@ -243,7 +252,7 @@ def _encoded(slots: Sequence[Slot], slot: Slot, values: Mapping[str, Raw]) -> by
             size = sum(len(_encoded(slots, each, values)) for each in cases if values[each.name] is not None)
             return put(kind.pieces, _held(slot, kind, size))
         counted = next(each.kind for each in slots if each.name == slot.counts)
-        return put(kind.pieces, _told(slot, kind, counted, values[slot.counts]))
+        return _put(kind, _told(slot, kind, counted, values[slot.counts]))
     return _put(kind, _number(kind, values[slot.name]) if slot.role == "value" else kind.default)
 
 
