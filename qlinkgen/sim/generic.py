@@ -16,7 +16,7 @@ from qlinkgen.plan.codec import Codec as Interpreter
 from qlinkgen.plan.content import with_decided
 from qlinkgen.sim.memory import Memory
 from qlinkgen.sim.refusals import Refusals
-from qlinkgen.sim.smallest import items_of, required_values
+from qlinkgen.sim.smallest import items_of, required_values, with_smallest
 from qlinkgen.sim.tables import Table
 from qlinkgen.sim.values import Values
 
@@ -146,7 +146,8 @@ class GenericNode:
     def _answer(
         self, kind: type[Message], request: Framed, echoes: Echoes, given: Mapping[str, object]
     ) -> Message:
-        values = dict(self._required.get(kind) or required_values(kind))
+        required = dict(self._required.get(kind) or required_values(kind))
+        values = dict(required)
         own = self._own(kind.NAME)
         values |= own
         values |= {name: getattr(request, of) if isinstance(of, str) else of for name, of in echoes.items()}
@@ -155,9 +156,12 @@ class GenericNode:
             kept = table.of(kind.NAME, request, values)
             own, values = {**own, **kept}, {**values, **kept}
         if address := kind.ADDRESS:
-            values[address] = self.number
+            required[address] = values[address] = self.number
         make: Callable[..., Message] = kind
-        message = make(**values)
+        if own and given:
+            for name in list(self._ruled_out(make, required, values)):
+                del values[name]
+        message = with_smallest(make(**values))
         settled = self._settled(self._interpreter, message, request) if self._interpreter else message
         if settled is not message:
             for name in own.keys() - echoes.keys():
@@ -165,10 +169,21 @@ class GenericNode:
                     setattr(settled, name, values[name])
         return settled
 
+    def _ruled_out(
+        self, kind: Callable[..., Message], required: Mapping[str, object], values: Mapping[str, object]
+    ) -> Iterator[str]:
+        """The fields that a new answer has, and that it does not have with these values of others."""
+        usual = kind(**required)
+        for name in values.keys() - required.keys():
+            others = {each: value for each, value in values.items() if each != name}
+            if getattr(usual, name) is not None and getattr(kind(**others), name) is None:
+                yield name
+
     def _own(self, name: str) -> dict[str, object]:
         """Return the values given to the node for an answer, and those that requests have set."""
         values = self._values.of(name, self._now) if self._values else {}
-        return {**values, **self._memory.of(name)} if self._memory else values
+        kept = {**values, **self._memory.of(name)} if self._memory else values
+        return {name: value for name, value in kept.items() if value is not None}  # absent unless decided
 
     def _settled(self, interpreter: Interpreter, message: Message, request: Framed) -> Message:
         """Return an answer in which the fields that echoed values decide have their defaults."""

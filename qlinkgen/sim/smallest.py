@@ -26,6 +26,11 @@ def _text(rule: Rule, count: int) -> str:
     return next(each for each in _CHARACTERS if rule.allows(each * rule.most)) * count
 
 
+def _maybe(rule: Rule) -> object:
+    """The smallest value of a field that is present."""
+    return _smallest(rule.rule)
+
+
 #: Name of a rule class, or of one that it inherits from, to its smallest legal value.
 _SMALLEST: Mapping[str, Callable[[Rule], object]] = {
     "IntRule": lambda rule: rule.ranges[0][0],
@@ -36,6 +41,7 @@ _SMALLEST: Mapping[str, Callable[[Rule], object]] = {
     "ScaledRule": lambda rule: min(rule.scale.value(rule.scale.low), rule.scale.value(rule.scale.high)),
     "FloatRule": lambda rule: rule.bounds[0] if rule.bounds else 0.0,
     "PaddedRule": lambda rule: _smallest(rule.rule),
+    "MaybeRule": _maybe,
     "OpenRule": lambda rule: _smallest(rule.rule),
     "ListRule": lambda rule: [_smallest(rule.item)] * rule.fewest,
     "RecordRule": lambda rule: _record(rule.kind),
@@ -70,6 +76,14 @@ def required_values(message: Callable[..., object]) -> dict[str, object]:
         and each.default is each.empty
         and each.name != getattr(message, "ADDRESS", "")  # which records do not have
     }
+
+
+def with_smallest(message: Made) -> Made:
+    """Give a new message legal values for the fields whose defaults are none; return it."""
+    for rule in getattr(message, "RULES", ()):
+        if _nearest(_SMALLEST, rule) is _maybe and not rule.allows(getattr(message, rule.name)):
+            setattr(message, rule.name, _maybe(rule))
+    return message
 
 
 def _smallest(rule: Rule) -> object:

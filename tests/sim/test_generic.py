@@ -10,13 +10,15 @@ import pytest
 from qlinkgen.backends.python import load
 from qlinkgen.link import MasterEngine, Timing
 from qlinkgen.link.codec import address_of, answers
-from qlinkgen.link.slave import SlaveEngine
+from qlinkgen.link.slave import Refusal, SlaveEngine
 from qlinkgen.plan import plan_of
 from qlinkgen.schema import load as load_schema
 from qlinkgen.schema import loads
 from qlinkgen.sim import VirtualPort, Wire
 from qlinkgen.sim.generic import GenericNode
+from qlinkgen.sim.refusals import Refusals
 from qlinkgen.sim.smallest import required_values
+from qlinkgen.sim.values import Values
 from qlinkgen.transport.blocking import BlockingMaster
 from tests.cli.wire import REPOSITORY
 
@@ -162,6 +164,54 @@ def test_smallest_values_leave_out_the_bytes_that_end_them() -> None:
     assert name == codec.NameResponse(name="0", key=b"\x01\x01")
     assert codec.NameResponse(name="0", key=b"\x01\x01").to_bytes() == b"0 \x01\x01\x00"
     assert parts == codec.PartsResponse(parts=[])
+
+
+STATED = """\
+qlinkgen: 1
+protocol: {name: gauge, title: Gauge, revision: "1", source: Manual}
+frame:
+  parts:
+    code: {role: message, type: u8}
+    length: {type: u8, counts: [data]}
+    status: {type: u8, if: {direction: response}}
+    data: {role: payload, size: 0..32}
+bus: {kind: master_slave, response_within: 100 ms}
+defaults: {repeat: safe}
+replies:
+  failed: {if: {status: 7}, fields: {reason: u8, why: {type: "text[1..4]", terminator: 20}}}
+commands:
+  read: {id: 1, request: {}, response: {level: u16, name: "text[0..4]"}}
+"""
+
+
+def test_fields_that_a_refusal_decides() -> None:
+    protocol, faults = loads(STATED, "gauge.yaml")
+    assert protocol is not None, faults
+    codec, plan = load(protocol), plan_of(protocol)
+    refusals = Refusals(codec, {"read": 1.0})
+    values = Values(protocol, {}, {"read": {"level": 5}})
+    for each in (
+        GenericNode(codec, plan=plan, refusals=refusals),
+        GenericNode(codec, plan=plan, refusals=refusals, values=values),
+    ):
+        with pytest.raises(Refusal) as refused:
+            each.handle(codec.ReadRequest(), 0.0)
+        assert codec.encode(refused.value.reply).hex() == "010307005f20"
+    usual = GenericNode(codec, plan=plan, values=values).handle(codec.ReadRequest(), 0.0)
+    assert usual == codec.ReadResponse(level=5)
+
+
+def test_defaults_follow_the_values_that_decide_them() -> None:
+    protocol, faults = loads(STATED, "gauge.yaml")
+    assert protocol is not None, faults
+    codec = load(protocol)
+    answer = codec.ReadResponse(status=7, why="hot")
+    assert (answer.level, answer.name, answer.reason) == (None, None, 0)
+    assert answer.to_frame().hex() == "01050700686f7420"
+    answer = codec.ReadResponse()
+    assert (answer.level, answer.name, answer.reason, answer.why) == (0, "", None, None)
+    with pytest.raises(codec.EncodeError, match="level: 1 cannot be sent"):
+        codec.ReadResponse(status=7, level=1).to_frame()
 
 
 def test_what_it_repeats() -> None:

@@ -310,7 +310,7 @@ class ClassBuilder:
         slots = by_slot((*place.beside, *message.payload.settable))
         arguments += [values.argument(each, place) for each in slots]
         body = [f"self.{address} = {address}"] if address else []
-        body += [values.assignment(each, place) for each in slots]
+        body += [line for each in slots for line in values.assignment(each, place)]
         taken = ["self", "*", *arguments] if arguments else ["self"]
         return [*wrapped("def __init__(", taken, ") -> None:", 4), *indented(body or ["pass"])]
 

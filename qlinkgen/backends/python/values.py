@@ -8,10 +8,10 @@ from decimal import Decimal
 from typing import assert_never
 
 from qlinkgen.backends import python_text
-from qlinkgen.backends.python.layout import Call, literal
+from qlinkgen.backends.python.layout import Call, indented, literal
 from qlinkgen.backends.python.names import attribute, held
 from qlinkgen.backends.python.place import Place
-from qlinkgen.backends.python.varied import is_last, is_opened
+from qlinkgen.backends.python.varied import condition, is_last, is_opened, of_attribute
 from qlinkgen.model.condition import Test
 from qlinkgen.model.frame import PartBits
 from qlinkgen.model.message import Value
@@ -89,29 +89,41 @@ def argument(slot: Slot, place: Place) -> str:
     kind, name = annotation(slot, place), held(each)
     if is_required(each):
         return f"{name}: {kind}"
-    if each.presence is not None and not each.presence.given:
-        return f"{name}: {kind} = None"
+    if each.presence is not None:
+        return f"{name}: {kind} = {place.use('NEW') if _decided(slot) else 'None'}"
     if isinstance(each, ItemsStep | RecordStep | RecordsStep):
-        if each.presence is not None:
-            return f"{name}: {kind} = {place.use('NEW')}"
         return f"{name}: {kind} | None = None"
     return f"{name}: {kind} = {default(each, place)}"
 
 
-def assignment(slot: Slot, place: Place) -> str:
-    """The statement that stores an argument; each message gets a new list or record as a default."""
+def assignment(slot: Slot, place: Place) -> list[str]:
+    """The statements that store an argument; each message gets a new list or record as a default."""
     each = first_case(slot)
     name = held(each)
-    if each.presence is not None:
-        new = each.presence.given and isinstance(each, ItemsStep | RecordStep | RecordsStep)
-        return (
-            f"self.{name} = {default(each, place)} if {name} is NEW else {name}"
-            if new
-            else f"self.{name} = {name}"
-        )
-    if isinstance(each, ItemsStep | RecordStep | RecordsStep) and not each.required:
-        return f"self.{name} = {default(each, place)} if {name} is None else {name}"
-    return f"self.{name} = {name}"
+    if cases := _decided(slot):
+        return [f"if {name} is NEW:", *indented(_usual(name, cases, place)), *_otherwise(name)]
+    if each.presence is None and isinstance(each, ItemsStep | RecordStep | RecordsStep) and not each.required:
+        return [f"self.{name} = {default(each, place)} if {name} is None else {name}"]
+    return [f"self.{name} = {name}"]
+
+
+def _decided(slot: Slot) -> list[tuple[Holder, Presence]]:
+    """The cases of a value that earlier values decide, each with its condition."""
+    return [(each, each.presence) for each in slot if each.presence is not None and each.presence.when]
+
+
+def _usual(name: str, cases: Sequence[tuple[Holder, Presence]], place: Place) -> list[str]:
+    """The statements that store the default of the case that earlier values decide on, None if of none."""
+    lines, word = list[str](), "if"
+    for each, presence in cases:
+        test = condition([of_attribute(test) for test in presence.when], "self.{}")
+        lines += [f"{word} {test}:", f"    self.{name} = {default(each, place)}"]
+        word = "elif"
+    return [*lines, "else:", f"    self.{name} = None"]
+
+
+def _otherwise(name: str) -> list[str]:
+    return ["else:", f"    self.{name} = {name}"]
 
 
 def required_defaults(payload: PayloadPlan, place: Place) -> list[str]:

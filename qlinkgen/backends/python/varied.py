@@ -23,6 +23,11 @@ def condition(tests: Sequence[Test], number: str) -> str:
     return " and ".join(terms) if len(terms) > 1 else bare(terms[0])
 
 
+def of_attribute(test: Test) -> Test:
+    """The test of an attribute."""
+    return Test(attribute(test.value), test.ranges, test.negated)
+
+
 def _test(test: Test, number: str) -> str:
     rule = OneOf(tuple(Within(*each) for each in test.ranges))
     return integers.broken(rule, number) if test.negated else integers.holds(rule, number)
@@ -35,8 +40,7 @@ def is_last(step: RecordsStep) -> str:
 
 def ends(step: RecordsStep) -> str:
     """Whether the record ``each`` is the last one."""
-    tests = [Test(attribute(test.value), test.ranges, test.negated) for test in step.last]
-    return condition(tests, "each.{}")
+    return condition([of_attribute(test) for test in step.last], "each.{}")
 
 
 def is_opened(step: RecordsStep) -> str:

@@ -12,9 +12,8 @@ from qlinkgen.backends.python.layout import indented, literal
 from qlinkgen.backends.python.names import attribute, held, source_of
 from qlinkgen.backends.python.structs import format_of
 from qlinkgen.backends.python.values import condition_text
-from qlinkgen.backends.python.varied import condition, is_sized, octets_of, read_lines
+from qlinkgen.backends.python.varied import condition, is_sized, octets_of, of_attribute, read_lines
 from qlinkgen.backends.python.walked_size import sized_lines, times
-from qlinkgen.model.condition import Test
 from qlinkgen.plan.expr import Size, Within
 from qlinkgen.plan.parts import LengthPart
 from qlinkgen.plan.payload import (
@@ -110,7 +109,7 @@ class WalkedEncoder(Encoder):
         surplus = [
             line for each in values for line in self._misplaced(presence, each, f"self.{each} is not None")
         ]
-        test = condition([_python(each) for each in presence.when], "self.{}")
+        test = condition([of_attribute(each) for each in presence.when], "self.{}")
         found = [f"if {test}:", *indented([*missing, *lines])]
         return [*found, "else:", *indented(surplus)] if surplus else found
 
@@ -130,7 +129,7 @@ class WalkedEncoder(Encoder):
             body = self._misplaced(presence, held(step), self._unfit(step))
             body += [] if segment.run is None else self._counted(segment.run)
             self._step(step)
-            test = condition([_python(each) for each in presence.when], "self.{}")
+            test = condition([of_attribute(each) for each in presence.when], "self.{}")
             lines += [f"{word} {test}:", *indented([*body, *self._flushed()])]
             word = "elif"
         if not complete(cases):
@@ -252,7 +251,7 @@ class WalkedDecoder(Decoder):
             return lines
         test = "at < end"
         if not presence.optional:
-            test = condition([_python(each) for each in presence.when], "message.{}")
+            test = condition([of_attribute(each) for each in presence.when], "message.{}")
         absent = [f"message.{held(each)} = None" for each in segment.settable]
         found = [f"if {test}:", *indented(lines)]
         return [*found, "else:", *indented(absent)] if absent else found
@@ -273,7 +272,7 @@ class WalkedDecoder(Decoder):
         found: list[tuple[list[str], list[str]]] = []
         for segment in cases:
             assert segment.presence is not None
-            test = condition([_python(each) for each in segment.presence.when], "message.{}")
+            test = condition([of_attribute(each) for each in segment.presence.when], "message.{}")
             body = self._segment(segment)
             if found and found[-1][1] == body:
                 found[-1][0].append(test)
@@ -345,11 +344,6 @@ def _tested(cases: Sequence[Segment]) -> str:
     presence = cases[0].presence
     assert presence is not None
     return attribute(presence.choosing.value)
-
-
-def _python(test: Test) -> Test:
-    """The test of an attribute."""
-    return Test(attribute(test.value), test.ranges, test.negated)
 
 
 class VariedDecoder(WalkedDecoder):
