@@ -129,7 +129,8 @@ def test_members_in_c() -> None:
     [
         ('{type: i16, as: "hex[4]"}', "'as' has no effect on i16; use an unsigned integer"),
         ('{type: f32, as: "decimal[4]"}',
-         "'as' has no effect on f32; use an integer of up to 64 bits, with a scale such as 1/100"),
+         ("'as' has no effect on f32; use an integer of up to 64 bits, with a scale such as 1/100, "
+          "or as: scientific")),
         ('{type: u128, as: "decimal[4]"}',
          "'as' has no effect on u128; use an integer of up to 64 bits, with a scale such as 1/100"),
         ('{type: u8, as: "decimal[2]", byteorder: little}', "'byteorder' has no effect on text; remove it"),
@@ -140,7 +141,7 @@ def test_members_in_c() -> None:
         ('{type: u8, as: "decimal[6..2]"}',
          "decimal[6..2] ends before it begins; use 1 to 40 characters, the decimal point included"),
         ('{type: u8, as: "octal[3]"}',
-         "'octal[3]' is not a form of a number; use bcd, decimal, decimal[1..6] or hex[2]"),
+         "'octal[3]' is not a form of a number; use bcd, decimal, decimal[1..6], hex[2] or scientific"),
     ],
 )  # fmt: skip
 def test_wrong_keys(field: str, text: str) -> None:
