@@ -19,6 +19,15 @@ from qlinkgen.schema.source import parse
 ROOT = Path(__file__).parents[2]
 REFERENCE = (ROOT / "docs/schema-reference.md").read_text("utf-8")
 BLOCKS = re.findall(r"```yaml\n(.*?)```", REFERENCE, re.DOTALL)
+#: Protocols of the design of the language by their titles, each with its text and its schemas.
+PROTOCOLS = re.findall(
+    r"^### (.*?)\n(.*?)(?=^##)",
+    (ROOT / "docs/explain/language.md").read_text("utf-8"),
+    re.DOTALL | re.MULTILINE,
+)
+HEAD = (
+    'qlinkgen: 1\nprotocol: {name: example, title: Example, revision: "1", source: Example, doc: Example}\n'
+)
 FILES = [*(find(name) for name in (*shipped(), *library())), *sorted((ROOT / "tests/schemas").glob("*.yaml"))]
 
 
@@ -53,6 +62,18 @@ def test_example_of_the_reference(number: int) -> None:
     protocol, faults = loads(text, "example.yaml")
     assert protocol, [str(fault) for fault in faults]
     assert {fault.rule for fault in faults} <= {"unconfirmed", "unused-type"}
+
+
+@pytest.mark.parametrize(("title", "text"), PROTOCOLS, ids=lambda value: value[:20])
+def test_protocol_of_the_design(title: str, text: str, tmp_path: Path) -> None:
+    if title == "Modbus ASCII":  # includes the protocol before it
+        (rtu,) = re.findall(r"```yaml\n(.*?)```", dict(PROTOCOLS)["Modbus RTU"], re.DOTALL)
+        (tmp_path / "modbus_rtu.yaml").write_text(HEAD + rtu)
+    schemas = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
+    assert schemas
+    for schema in schemas:
+        protocol, faults = loads(HEAD + schema, str(tmp_path / "example.yaml"))
+        assert (protocol is None) == ("Not built:" in text), [str(fault) for fault in faults]
 
 
 def _dump(data: Any) -> str:
