@@ -270,6 +270,17 @@ messages:
   log: {id: 5, frame: long, fields: {v: u8}}
   state: {id: 6, frame: short, fields: {}}
 """,
+    "a coding over parts of which the last is in responses alone, which the reference did not code": """\
+frame:
+  parts:
+    code: {role: message, type: u8}
+    data: {role: payload, size: 1..9}
+    stamp: {type: u8, const: [1, 2], if: {direction: response}}
+    crc: {type: u8, algorithm: sum8, over: [code, data]}
+  coding: {add: AE, over: [code, data, stamp]}
+bus: {kind: link}
+commands: {ask: {id: 5, request: {v: u8}, response: {w: u8}, repeat: safe}}
+""",
     "records of variable size in records, whose sizes in C had one name": _PARTS
     + _BUS
     + 'types: {leaf: {fields: {n: u8, x: "u8[n]"}}, pair: {fields: {a: leaf, b: leaf}}}\n'

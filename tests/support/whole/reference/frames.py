@@ -657,7 +657,8 @@ def _coded_names(spec: Any, parts: list[Part], *, silent: bool) -> list[str]:
         return []
     for each in spec if isinstance(spec, list) else [spec or {}]:
         if "over" in each:
-            return list(each["over"])
+            # Some parts may be those of the other direction.
+            return [name for name in each["over"] if name in names]
     end = roles.index("terminator") if "terminator" in roles else len(names)
     return names[int(roles[0] == "constant") : end]
 

@@ -85,7 +85,7 @@ def _proven(document: Doc) -> None:
         size = int(check["type"][1:]) // 8
         frame["parts"][payload]["size"] = f"{low + size}..{high + size}"
         for command in document["commands"].values():
-            response = command["response"]
+            response = command.get("response")
             if isinstance(response, dict) and response.get("frame") == name:
                 response["fields"][last] = {**check}
 
