@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import json
 import os
+import stat
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -48,9 +49,12 @@ def keep(schema: Path, version: str | None, protocol: Protocol) -> None:
             return
         _prune(file.parent)
         descriptor, name = tempfile.mkstemp(dir=file.parent, prefix="new-")
-        with os.fdopen(descriptor, "w", encoding="ascii") as out:
-            out.write(text)
-        Path(name).replace(file)
+        try:
+            with os.fdopen(descriptor, "w", encoding="ascii") as out:
+                out.write(text)
+            Path(name).replace(file)
+        finally:
+            Path(name).unlink(missing_ok=True)
 
 
 def _file(schema: Path, version: str | None) -> Path | None:
@@ -84,9 +88,11 @@ def _hash(schema: Path, protocol: Protocol) -> str:
 
 def _is_own(path: Path) -> bool:
     """Whether only the user can write a file or a folder; systems without users of this kind say nothing."""
-    if not hasattr(os, "getuid"):
-        return path.exists()
     found = path.stat()
+    if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
+        return False  # reading a pipe waits
+    if not hasattr(os, "getuid"):
+        return True
     return found.st_uid == os.getuid() and not found.st_mode & 0o022
 
 

@@ -110,6 +110,21 @@ def test_what_others_can_write_is_not_believed(folder: Path, reads: Reads, therm
     assert reads() == 3
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes of POSIX")
+def test_a_folder_or_a_pipe_in_place_of_a_file(folder: Path, reads: Reads, thermo: Path) -> None:
+    load_protocol(str(thermo))
+    (file,) = folder.iterdir()
+    file.unlink()
+    file.mkdir()
+    load_protocol(str(thermo))
+    assert list(folder.iterdir()) == [file]
+    file.rmdir()
+    os.mkfifo(file, 0o600)
+    load_protocol(str(thermo))
+    assert reads() == 3
+    assert file.is_file()
+
+
 def test_no_folder(folder: Path, reads: Reads, thermo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder.parent.write_text("a file in its place")
     load_protocol(str(thermo))
