@@ -200,8 +200,7 @@ def _run(bench: Bench, cases: Cases, numbers: Sequence[int], *, as_json: bool) -
         click.echo(jsonlines.line(summary))
     else:
         _table(tally).show()
-        found, slow = counted(tally.findings, "finding"), counted(tally.slow, "slow recovery")
-        click.echo(f"{found}, {slow.replace('recoverys', 'recoveries')}")
+        click.echo(f"{counted(tally.findings, 'finding')}, {tally.slow} slow to recover")
     return WRONG if tally.findings else FINE
 
 

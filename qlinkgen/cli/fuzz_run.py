@@ -80,17 +80,18 @@ class Bench:
 
     def is_there(self) -> bool:
         """Whether the device answers the probe."""
-        return self._probes() is not None
+        return self._probes(PROBES) is not None
 
     def run(self, case: Case) -> Outcome:
         """Send a case, then the probe unless the case was answered."""
         command = self._codec.COMMANDS[case.command]
         result, received = self._ask(case) if case.kind == VALID else self._send(case, command)
         answered = case.kind == VALID and result in {ANSWERED, REFUSED}
-        return Outcome(case, result, received, 0 if answered else self._probes())
+        return Outcome(case, result, received, 0 if answered else self._probes(self._most))
 
-    def _probes(self) -> int | None:
-        for number in range(1, self._most + 1):
+    def _probes(self, most: int) -> int | None:
+        """Send requests until one is answered; return how many."""
+        for number in range(1, most + 1):
             try:
                 self._master.transact(self._probe, attempts=1, trial=True)
             except Refused:

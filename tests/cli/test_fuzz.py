@@ -9,6 +9,7 @@ import pytest
 
 from qlinkgen.backends.python import load
 from qlinkgen.cli.fuzz_cases import DAMAGED, VALID, WRONG, Case, Cases
+from qlinkgen.cli.fuzz_run import PROBES
 from qlinkgen.link import SlaveEngine
 from qlinkgen.link.codec import is_message
 from qlinkgen.plan import plan_of
@@ -156,6 +157,9 @@ def test_refused(qlinkgen: Run, words: tuple[str, ...], code: int, text: str) ->
 
 
 def test_nobody_is_there(qlinkgen: Run, on_line: OnLine) -> None:
-    result = qlinkgen("fuzz", SCHEMA, on_line(Wire(baud=19200)), "--node", "3")
+    wire, sent = Wire(baud=19200), []
+    wire.taps.append(lambda _at, _source, data: sent.append(data))
+    result = qlinkgen("fuzz", SCHEMA, on_line(wire), "--node", "3")
     assert (result.code, result.out) == (1, "")
     assert "the device does not answer " in result.err
+    assert len(b"".join(sent)) <= PROBES * 8  # and not those that fill the longest frame twice
