@@ -26,6 +26,14 @@ if TYPE_CHECKING:
 
 #: Keys of the file, as the options are called.
 _KEYS = ("values", "delay", "refuse", "memory", "tables")
+#: What is written in place of a mapping that is none.
+_EXAMPLES = {
+    "the file": "values: {get: {value: 1}}",
+    "values": "values: {get: {value: 1}}",
+    "delay": "delay: {get: 0.5}",
+    "refuse": "refuse: {get: 0.1}",
+    "tables": "tables: {holding: {get: {at: number, value: value}}}",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,5 +185,7 @@ def _mapping(given: Json, path: str | None, what: str) -> Mapping[str, Json]:
     if given is None:
         return {}
     if not isinstance(given, Mapping):
-        raise Failure(f"{path}: {what} is not a mapping; write for example values: {{get: {{value: 1}}}}")
+        raise Failure(
+            f"{path}: {what} is not a mapping; write for example {_EXAMPLES[what.partition(':')[0]]}"
+        )
     return given

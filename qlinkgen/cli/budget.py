@@ -210,7 +210,7 @@ def _nodes(protocol: Protocol, command: Command, where: str, text: str) -> int:
         return 1
     if not where:
         raise Failure(f"{text}: {command.name} is sent to a node; write for example 3:{text}")
-    return len(parse_nodes(where, *protocol.bus.nodes))
+    return len(parse_nodes(where, *protocol.bus.nodes, f"{command.name}: nodes"))
 
 
 def _show(turns: Sequence[Turn], baud: int) -> None:

@@ -163,21 +163,21 @@ def with_crc(plain: A, choose: Callable[[str], B], crc: str | None) -> A | B:
         raise Failure(f"--set crc={crc}: {error}") from None
 
 
-def parse_nodes(text: str, first: int, last: int) -> list[int]:
-    """Parse node numbers such as 3, 1-16 or 1,3,5-7; return them in ascending order."""
+def parse_nodes(text: str, first: int, last: int, where: str = "--nodes") -> list[int]:
+    """Parse node numbers such as 3, 1-16 or 1,3,5-7, given at `where`; return them in ascending order."""
     nodes: list[int] = []
     for part in text.split(","):
         low, dash, high = (piece.strip() for piece in part.partition("-"))
         begin, end = whole_number(low), whole_number(high) if dash else whole_number(low)
         if begin is None or end is None:
             raise Failure(
-                f"--nodes {text}: '{part.strip()}' is not a node; write for example 3, 1-16 or 1,3,5-7"
+                f"{where} {text}: '{part.strip()}' is not a node; write for example 3, 1-16 or 1,3,5-7"
             )
         if not first <= begin <= end <= last:
             fix = f"nodes are {first}..{last}" if begin <= end else f"write {end}-{begin}"
-            raise Failure(f"--nodes {text}: {part.strip()} is out of range; {fix}")
+            raise Failure(f"{where} {text}: {part.strip()} is out of range; {fix}")
         if double := set(nodes) & set(range(begin, end + 1)):
-            raise Failure(f"--nodes {text}: duplicate node {min(double)}; list each once")
+            raise Failure(f"{where} {text}: duplicate node {min(double)}; list each once")
         nodes += range(begin, end + 1)
     return sorted(nodes)
 

@@ -67,7 +67,7 @@ def test_a_silence_between_frames_and_no_address(qlinkgen: Run, thermo: Path) ->
     [
         (("qlink", "1:motoin=1"), "qlink has no command 'motoin'; did you mean motion?"),
         (("qlink", "motion=1"), "motion is sent to a node; write for example 3:motion=1"),
-        (("qlink", "17:motion=1"), "nodes are 1..16"),
+        (("qlink", "17:motion=1"), "motion: nodes 17: 17 is out of range; nodes are 1..16"),
         (("qlink", "3:motion"), "is not NODES:COMMAND=SECONDS"),
         (("qlink", "3:motion=0"), "is not NODES:COMMAND=SECONDS"),
         (("trio", "1:x=1"), "trio has no master that asks"),

@@ -47,6 +47,8 @@ def test_wrong_options(options: tuple[str, ...], error: str, thermo: Path, qlink
     [
         ("values: [1]", "values is not a mapping; write for example values: {get: {value: 1}}"),
         ("values: {get_log: 1}", "values: get_log is not a mapping"),
+        ("delay: 1", "delay is not a mapping; write for example delay: {get: 0.5}"),
+        ("tables: {holding: 1}", "tables: holding is not a mapping; write for example tables: {holding"),
         ("memory: true\nvalue: {}", ":2:1: unknown key 'value'; did you mean values?"),
         ("delay: {get_log: [1]}", "delay of get_log: [1] was given; give a number, 0 or more"),
         ("values: {", ":2:1: "),
