@@ -59,6 +59,8 @@ def _allowance(time: Duration | None) -> Allowance:
     return Allowance(time.byte_times, time.seconds) if time else Allowance()
 
 
+#: What tells answers of the same number apart.
+_TELLING = ("frame", "frames", "bus")
 #: The hint where a reply has the id of its response.
 _ONE_ANSWER = "; or make one response of both, with if or switch for their fields, and with means"
 
@@ -442,7 +444,9 @@ class CommandBuilder:
                 other = seen.setdefault((direction, message.id), message)
                 if other is not message and not {message.name, other.name} <= self._asked:
                     what = f"{self._called(message)} has the id of {self._called(other)}, {message.id:#04x}"
-                    needs = (path, self._build.id_places[other.name])
+                    needs: list[Path] = [path, self._build.id_places[other.name]]
+                    # What tells answers apart is known once the frame is.
+                    needs += ((key,) for key in _TELLING if {message.name, other.name} <= answers)
                     hint = "use another id"
                     if message.command and message.direction == other.direction == "response":
                         hint += _ONE_ANSWER if message.command == other.command else ""

@@ -82,7 +82,10 @@ def build_blob(spec: FieldSpec, text: TypeText, payload_max: int, location: Loca
     location.reject(spec, (*_NUMBER_KEYS, "unit", "reserved"), text.base)
     if spec.const is not None:
         location.key_fault(
-            "not-applicable", "const", f"'const' has no effect on {text.base}", "use integers with const"
+            "not-applicable",
+            "const",
+            f"'const' has no effect on {text.base}",
+            "use an integer, or an enum of one word",
         )
     length = build_length(text, 8, payload_max, location)
     if length is None:

@@ -59,7 +59,9 @@ class ManyBuilder:
     def build(self, spec: ManySpec, path: Path) -> Many | None:
         """The end that a command states, None if it is wrong."""
         given = [key for key in ("count", "until", "within", "each") if getattr(spec, key) is not None]
-        if given == ["until", "within"] and self._is_command(spec.until):
+        # A time limits answers that a command stops; a name of a reply or of nothing is reported below.
+        named = isinstance(spec.until, str) and spec.until not in self._replies
+        if given == ["until", "within"] and named:
             given.remove("within")
         if len(given) != 1:
             what = f"the answers have {len(given)} ends" if given else "the answers have no end"
@@ -81,9 +83,6 @@ class ManyBuilder:
         if spec.count is not None:
             return self._count(spec.count, (*path, "count"))
         return self._field(spec.until or {}, (*path, "until"))
-
-    def _is_command(self, until: object) -> bool:
-        return isinstance(until, str) and until in self._commands and until not in self._replies
 
     def _error(self, path: Path, what: str, hint: str) -> None:
         self._report.error(_RULE, path, what, hint)

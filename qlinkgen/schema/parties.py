@@ -82,7 +82,7 @@ class _Parties:
         fault = self._fault()
         if fault is not None:
             place, what, hint = fault
-            needs = (place, ("bus",)) if place != ("bus",) else (("bus",), self._path)
+            needs = (place, ("bus",), self._path)
             self._report.error(_RULE, place, what, hint, of_key=True, needs=needs)
         return fault is not None
 

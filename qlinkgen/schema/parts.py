@@ -130,6 +130,8 @@ class PartBuilder:
             if role in _SINGLE_ROLES and other != name and not longer:
                 what = f"{name} and {other} are both the {role}"
                 hint = "a frame has one of each role but constant, message and checksum"
+                if role == "length":
+                    hint = f"if one follows from the other, write {name}: {{equals: {other} - 24}}"
                 self.fault("bad-frame", place, what, hint)
                 fit = False
         for role in needed:

@@ -291,9 +291,7 @@ class IdBuilder:
     def _stated(self, stated: StatedId, direction: Direction, path: Path, whose: str) -> int:
         given = stated.given
         if not isinstance(self._frame, DelimitedFrame):
-            if isinstance(given, str):
-                self._not_number(given, path)
-            return (given if isinstance(given, int) else 0 if given else self._missing(path)) + stated.added
+            return self._alone(given, path) + stated.added
         if self._texts is not None:
             return self._text_number(self._texts, stated, path)
         pieces = [each for each in self._pieces if each.only in (None, direction)]
@@ -315,6 +313,14 @@ class IdBuilder:
             others = {each.name for each in self._pieces if each not in pieces}
             given = {name: value for name, value in given.items() if name not in others}
         return self._added(self._composed(given, pieces, path), stated.added, path, whose)
+
+    def _alone(self, given: object, path: Path) -> int:
+        """The id in a frame whose pieces are not known, or that has none."""
+        if isinstance(given, str):
+            self._not_number(given, path)
+        elif isinstance(given, Mapping):
+            self._report.taint(path)
+        return given if isinstance(given, int) else 0 if given else self._missing(path)
 
     def _text_number(self, texts: TextIds, stated: StatedId, path: Path) -> int:
         if stated.given is None:

@@ -96,6 +96,7 @@ class _Command:
         means = answer.means
         if means is None and self._common is None:
             means = self._means(forms)
+            self._report.move((*target[:-1], "means"), (*forms[0].path, "if"))
         within = next((each.spec.within for each in forms if each.spec.within), answer.within)
         after = next((each.spec.after for each in forms if each.spec.after), answer.after)
         changed = {"fields": fields, "means": means, "within": within, "after": after}
@@ -154,6 +155,8 @@ class _Command:
         found = dict(list(fields.items())[:before])
         for name in names[before:]:
             found[name] = _with(fields[name], reverse) if name in self.fields else fields[name]
+            if name in self.fields and fields[name].when is None:
+                self._report.move((*target, name, "if"), (*form.path, "if"))
         for name, spec in given:
             if name in found:
                 what = f"{name} is a field of the response of {self._name}, and another one of {form.name}"

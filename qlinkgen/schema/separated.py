@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from qlinkgen.model.fields import Field
+from qlinkgen.model.floats import Float
 from qlinkgen.model.frame import DelimitedFrame, Frame
 from qlinkgen.model.integer import TextForm
 from qlinkgen.model.message import Message
@@ -85,7 +86,9 @@ def _checked(field: Field, separator: bytes, excluded: bytes, path: Path, report
         return replace(field, type=replace(kind, excluded=excluded))
     if not isinstance(number, Scalar) or number.text is None:
         what = f"{field.name} is not a text, so it may contain the separator"
-        hint = "use text, an enum of words, or a number with as: decimal or as: hex"
+        real = isinstance(number, Scalar) and isinstance(number.meaning, Float)
+        form = "with as: scientific" if real else "with as: decimal or as: hex"
+        hint = f"use text, an enum of words, or a number {form}"
         report.error(_RULE, path, what, hint, of_key=True)
         return field
     if (fault := _conflict(field.name, number.text, separator, excluded)) is not None:

@@ -150,7 +150,9 @@ class TextIds:
             what, hint = f"{name} {shown(given)} is not text", f'quote it: "{given}"'
         elif not least <= len(given) <= most:
             what = f"{name} {shown(given)} has {len(given)} characters"
-        elif not given.isascii() or not given.isprintable() or " " in given:
+        elif " " in given:
+            what = f"{name} {shown(given)} contains a blank"
+        elif not given.isascii() or not given.isprintable():
             what = f"{name} {shown(given)} has characters that are not printable ASCII"
         if what:
             self._report.error("id-does-not-fit", path, what, hint, needs=(path, ("frame",)))
