@@ -89,11 +89,11 @@ def answers_of(response: Any) -> list[Message]:  # Any: as `Reply.response`
 
 def summary(statistics: PollStatistics) -> str:
     """Return the counts and times as one line."""
+    response = f"response time {_spread(statistics.response)}, " if statistics.answered else ""
     requests = counted(statistics.answered + statistics.failed, "request")
     return (
         f"{requests}, {statistics.answered} answered, {statistics.failed} not; "
-        f"{counted(statistics.skipped, 'turn')} left out; response time {_spread(statistics.response)}, "
-        f"jitter {_spread(statistics.jitter)}"
+        f"{counted(statistics.skipped, 'turn')} left out; {response}jitter {_spread(statistics.jitter)}"
     )
 
 

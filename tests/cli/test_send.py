@@ -14,8 +14,10 @@ from typing import Any
 import pytest
 
 from qlinkgen.backends.python import load
+from qlinkgen.cli.repeating import summary
 from qlinkgen.codecs import qlink
 from qlinkgen.link import SlaveEngine
+from qlinkgen.link.poll import PollStatistics
 from qlinkgen.protocols.qlink import VirtualNode
 from qlinkgen.schema import load as load_schema
 from qlinkgen.sim import Wire
@@ -361,6 +363,13 @@ def test_again_and_again(qlinkgen: Run, on_line: OnLine) -> None:
     heard = -100
     started = qlinkgen("send", "qlink", asked[1], "node_start", "--node", "3", *asked[-2:], "--count", "2")
     assert [each["sent"] for each in objects(started.out)] == ["node_start", "node_start"]
+
+
+def test_no_response_time_without_a_response() -> None:
+    assert "response time" in summary(PollStatistics(answered=1))
+    assert summary(PollStatistics(failed=2)).startswith(
+        "2 requests, 0 answered, 2 not; 0 turns left out; jitter"
+    )
 
 
 def test_a_signal_ends_the_repetition() -> None:
