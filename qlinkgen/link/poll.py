@@ -178,7 +178,7 @@ class Poller:
         else:
             statistics.jitter.add(now - turn.due)
             statistics.skipped += turn.advance(now)
-        outcome: Any
+        outcome: object
         try:
             reply: Reply = yield Ask(turn.request, attempts=1 if trial else None, trial=trial)
         except LinkError as error:

@@ -83,7 +83,7 @@ def restore(nodes: Sequence[Sequence[Cell]]) -> Protocol:
     Raises:
         NotStorable: the data is not that of a model.
     """
-    made: list[Any] = []
+    made: list[object] = []
     try:
         for name, *cells in nodes:
             made.append(_made(str(name), [_value(cell, made) for cell in cells]))
@@ -113,7 +113,7 @@ def _made(name: str, values: list[object]) -> object:
 
 
 @cache
-def _class(name: str) -> tuple[type[Any], tuple[str, ...]]:
+def _class(name: str) -> tuple[type[object], tuple[str, ...]]:
     """Return a class of the model, and the arguments of its constructor."""
     module, _, own = name.rpartition(".")
     if not module.isidentifier():
