@@ -83,7 +83,10 @@ class GenericNode:
         command = self._commands.get(type(request))
         if command is not None and self._refusals and (refusal := self._refusals.of(command)):
             reply, given = refusal
-            raise Refusal(self._answer(reply.message, request, reply.echoes, given))
+            answer = self._answer(reply.message, request, reply.echoes, {})
+            if reply.meaning(answer) != "refused":
+                answer = self._answer(reply.message, request, reply.echoes, given)
+            raise Refusal(answer)
         if self._memory:
             self._memory.keep(request)
         for table in self._tables:
