@@ -236,7 +236,11 @@ def _show(turns: Sequence[Turn], baud: int) -> None:
     time = f"{fastest.time * 100:.1f}..{slowest.time:.1%}"
     click.echo(f"cycle {cycle}; line {line}, time {time}")
     if slowest.time > 1:
-        when = "with the longest messages" if fastest.time <= 1 else "even with the shortest messages"
+        when = (
+            "with the longest messages and latest answers"
+            if fastest.time <= 1
+            else "even with the shortest messages"
+        )
         click.echo(f"the requests do not fit into their periods {when}; ask less often or fewer nodes")
 
 

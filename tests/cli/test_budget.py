@@ -46,7 +46,7 @@ def test_a_simulated_line_is_between_the_bounds(qlinkgen: Run) -> None:
 def test_what_does_not_fit(qlinkgen: Run) -> None:
     result = qlinkgen("budget", "qlink", "1-4:motion=0.02", "1-4:read=0.5")
     assert result.code == 1
-    assert "do not fit into their periods with the longest messages" in result.out
+    assert "do not fit into their periods with the longest messages and latest answers" in result.out
     result = qlinkgen("budget", "qlink", "1-16:motion=0.02", "--baud", "9600")
     assert "do not fit into their periods even with the shortest messages" in result.out
 
