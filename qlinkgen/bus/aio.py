@@ -15,7 +15,7 @@ from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Event, Frame
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.peer import PeerEngine
-from qlinkgen.link.poll import Key, Polled, Poller
+from qlinkgen.link.poll import Periods, Polled, Poller, Requests
 from qlinkgen.link.slave import Node as Handlers
 from qlinkgen.link.transaction import Accepts
 from qlinkgen.transport.aio import AsyncMaster
@@ -72,7 +72,7 @@ class AsyncCalls(Watched, AsyncMaster):
         await self.transact(request)
 
     def poll(
-        self, periods: Mapping[Key, float] | Poller, *, requests: Mapping[Key, Framed] | None = None
+        self, periods: Periods | Poller, *, requests: Requests | None = None
     ) -> AsyncGenerator[Polled, None]:
         """Ask periodically, and return an iterator over the outcomes: time, node, command, response or error.
 
@@ -80,13 +80,12 @@ class AsyncCalls(Watched, AsyncMaster):
         asked less often. Close the iterator to end it.
 
         Args:
-            periods: seconds between two requests by node and command, such as {(3, "get_zones"): 0.5}; the
-                node is None where frames have no address. Or a `Poller`, which has statistics.
-            requests: those of commands that need values, by node and command.
+            periods: seconds between two requests by node and command, such as {(3, "get_zones"): 0.5}; by
+                command where frames have no address: {"get_zones": 0.5}. Or a `Poller`, which has statistics.
+            requests: those of commands that need values, by the same keys.
 
         Raises:
-            ValueError: a period is not above 0, or there is none.
-            KeyError: an unknown command.
+            ValueError: a period is not above 0, or there is none; a command is unknown, or its node missing.
             TypeError: the request of a command needs values.
         """
         poller = periods if isinstance(periods, Poller) else Poller(self.codec, periods, requests=requests)

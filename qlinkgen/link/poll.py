@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from qlinkgen.errors import LinkError, NoReply
 from qlinkgen.link.codec import Framed, Module
@@ -21,6 +21,10 @@ from qlinkgen.link.transaction import Reply
 
 #: A node, None where frames have no address, and a command.
 Key = tuple[int | None, str]
+#: Seconds between two requests, by node and command; by command alone where frames have no address.
+Periods: TypeAlias = Mapping[Key, float] | Mapping[tuple[int, str], float] | Mapping[str, float]
+#: Requests by the same keys.
+Requests: TypeAlias = Mapping[Key, Framed] | Mapping[tuple[int, str], Framed] | Mapping[str, Framed]
 #: In place of a node's number in the book of health, where frames have no address.
 _ONLY = 0
 
@@ -114,30 +118,31 @@ class Poller:
     def __init__(
         self,
         codec: Module,
-        periods: Mapping[Key, float],
+        periods: Periods,
         *,
-        requests: Mapping[Key, Framed] | None = None,
+        requests: Requests | None = None,
         policy: HealthPolicy | None = HealthPolicy(),  # noqa: B008  # immutable
     ) -> None:
         """Make the requests.
 
         Args:
             codec: the generated module.
-            periods: seconds between two requests, above 0, by node and command. The node is None where frames
-                have no address.
+            periods: seconds between two requests, above 0, by node and command; by command alone, or with
+                None for the node, where frames have no address.
             requests: those of commands that need values; others have their defaults.
             policy: when a node is silent, and how often it is tried; None: all requests keep their periods.
 
         Raises:
-            ValueError: a period is not above 0, or no request is given.
-            KeyError: an unknown command.
+            ValueError: a period is not above 0, no request is given, a command is unknown, or a key names a
+                node where frames have no address, or none where they have one.
             TypeError: the request of a command needs values.
         """
         if not periods:
             raise ValueError("periods: no request was given; give at least one, {(3, 'name'): 0.5}")
-        given = requests or {}
+        given = {_key(codec, each): request for each, request in (requests or {}).items()}
         self._turns: list[_Turn] = []
-        for key, period in periods.items():
+        for each, period in periods.items():
+            key = _key(codec, each)
             if not 0 < period < math.inf:
                 raise ValueError(f"periods: {period} s of {key} must be above 0 and finite")
             request = given[key] if key in given else request_of(codec, *key)
@@ -205,15 +210,28 @@ class Poller:
         self._health.answered(node)
 
 
+def _key(codec: Module, given: Key | str) -> Key:
+    """The node and the command of a key."""
+    node, name = (None, given) if isinstance(given, str) else given
+    if name not in codec.COMMANDS:
+        raise ValueError(f"unknown command {name!r}; commands are {', '.join(codec.COMMANDS)}")
+    addressed = bool(codec.COMMANDS[name].request.ADDRESS)
+    if node is not None and not addressed:
+        raise ValueError(f"{given!r} names a node, but frames of {name} have no address; give {name!r}")
+    if node is None and addressed:
+        raise ValueError(f"{given!r} names no node, but frames of {name} have an address; give (1, {name!r})")
+    return node, name
+
+
 def request_of(codec: Module, node: int | None, command: str) -> Framed:
     """Return the request of a command to a node, with the defaults of its fields.
 
     Raises:
         KeyError: an unknown command.
-        TypeError: it needs values, or a node where frames have no address.
+        TypeError: it needs values.
     """
     kind: Any = codec.COMMANDS[command].request  # the class of a message of its own module
-    request: Framed = kind(**({} if node is None else {kind.ADDRESS or "node": node}))
+    request: Framed = kind(**({} if node is None else {kind.ADDRESS: node}))
     return request
 
 

@@ -13,7 +13,7 @@ import pytest
 from qlinkgen.codecs import qlink
 from qlinkgen.errors import NoReply
 from qlinkgen.link import HealthPolicy
-from qlinkgen.link.poll import Key, Polled, Poller, PollStatistics
+from qlinkgen.link.poll import Key, Periods, Polled, Poller, PollStatistics
 from qlinkgen.transport.aio import AsyncMaster
 from qlinkgen.transport.blocking import BlockingMaster
 from tests.link.line import BYTE, bus, make
@@ -114,10 +114,12 @@ def test_the_same_on_asyncio() -> None:
         ({}, ValueError, "no request was given"),
         ({(3, "motor_position"): 0.0}, ValueError, "must be above 0"),
         ({(3, "motor_position"): float("inf")}, ValueError, "must be above 0"),
-        ({(3, "nonsense"): 1.0}, KeyError, "nonsense"),
+        ({(3, "nonsense"): 1.0}, ValueError, "unknown command 'nonsense'"),
+        ({(None, "read"): 1.0}, ValueError, "names no node, but frames of read have an address"),
+        ({"read": 1.0}, ValueError, r"'read' names no node.*give \(1, 'read'\)"),
         ({(3, "read"): 1.0}, TypeError, "size"),
     ],
 )
-def test_refused(periods: dict[Key, float], error: type[Exception], text: str) -> None:
+def test_refused(periods: Periods, error: type[Exception], text: str) -> None:
     with pytest.raises(error, match=text):
         Poller(qlink, periods)
