@@ -13,6 +13,7 @@ from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.cli.simulating import port_of, run_bus, say, watch_line
 from qlinkgen.cli.wire_options import ANY_SPEED, counted, parse_nodes, with_crc
 from qlinkgen.link.codec import Codec, Framed
+from qlinkgen.link.many import has_endless
 from qlinkgen.link.slave import Node, SlaveEngine
 from qlinkgen.plan import plan_of
 from qlinkgen.protocols.qlink.facts import NODES
@@ -46,7 +47,12 @@ def simulate_bus(
     bits = codec.BUS.bits_per_byte
     # A line delivers byte by byte; without a speed, whole frames are equivalent.
     wire = Wire(
-        baud=baud, bits_per_byte=bits, faults=plan, echo=echo, chunks="byte" if baud is not None else "frame"
+        baud=baud,
+        bits_per_byte=bits,
+        faults=plan,
+        echo=echo,
+        collisions=not has_endless(codec),
+        chunks="byte" if baud is not None else "frame",
     )
     turnaround = TURNAROUND * bits / baud if baud else 0.0
     engines = [SlaveEngine(codec, node, turnaround=turnaround, host_slack=OTHER_PROGRAM) for node in numbered]

@@ -36,6 +36,14 @@ def stops(codec: Codec) -> Iterator[tuple[Command, Stop]]:
             yield command, Stop(command.many, codec)
 
 
+def has_endless(codec: Codec) -> bool:
+    """Whether only other commands end some answers: these need a line for each direction.
+
+    On one line for both, a node that sends all the time leaves the master no time to stop it.
+    """
+    return any(True for _ in stops(codec))
+
+
 class Stop:
     """How the answers to a request without an end are stopped."""
 

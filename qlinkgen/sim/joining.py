@@ -10,6 +10,7 @@ from typing import Any, Generic, Literal, TypeVar
 from qlinkgen.bus import aio, blocking
 from qlinkgen.bus.making import make_peer
 from qlinkgen.link.codec import Codec
+from qlinkgen.link.many import has_endless
 from qlinkgen.link.peer import PeerEngine
 from qlinkgen.link.slave import Node, SlaveEngine
 from qlinkgen.sim.faults import FaultPlan
@@ -66,7 +67,12 @@ def join(
     codec = master.codec
     speed = codec.BUS.baud or USUAL_SPEED
     paced = transport == "virtual"
-    wire = Wire(baud=speed if paced else None, bits_per_byte=codec.BUS.bits_per_byte, faults=faults)
+    wire = Wire(
+        baud=speed if paced else None,
+        bits_per_byte=codec.BUS.bits_per_byte,
+        faults=faults,
+        collisions=not has_endless(codec),
+    )
     with (
         _port(wire, transport, speed) as port,
         join_at(port, wire, master, *handlers, turnaround=turnaround, own=own, **options) as joined,

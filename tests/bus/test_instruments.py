@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 from typing import Any
 
 import pytest
@@ -68,3 +69,55 @@ def test_a_node_of_the_schema_alone_answers() -> None:
         answer = pair.master.identify()
         assert (answer.maker, answer.serial) == (" ", "")
         assert pair.master.measure_ac().mode is codec.Mode.VOLTAGE
+
+
+SCALE = """\
+qlinkgen: 1
+protocol: {name: balance, title: A balance, revision: "1", source: Manual}
+frame:
+  parts:
+    command: {role: message, type: "text[1..4]"}
+    data: {role: payload, size: 0..20}
+    end: {role: terminator, value: 0D 0A}
+bus: {kind: master_slave, baud: 9600, response_within: 1 s}
+defaults: {repeat: safe, addressing: none}
+commands:
+  weigh:
+    id: SIR
+    request: {}
+    response: {value: {type: u16, as: "decimal[5]"}}
+    many: {until: cancel, within: 2 s}
+  cancel: {id: "@", request: {}, response: {}}
+  read: {id: S, request: {}, response: {value: {type: u16, as: "decimal[5]"}}}
+"""
+
+
+def test_answers_without_an_end_are_left_early() -> None:
+    balance: Any = of_text(SCALE)
+    values: Any = importlib.import_module(f"{PACKAGE}.balance")
+
+    class Balance(balance.SlaveHandlers):  # type: ignore[misc]  # Any: generated at run time
+        """A slave that sends weights as fast as it can."""
+
+        def weigh(self, request: Any, now: float) -> Any:
+            return (values.WeighResponse(value=each) for each in range(1000))
+
+        def cancel(self, request: Any, now: float) -> Any:
+            return values.CancelResponse()
+
+        def read(self, request: Any, now: float) -> Any:
+            return values.ReadResponse(value=7)
+
+    with join(balance.Device, Balance(0)) as pair:
+        weights = pair.master.weigh()
+        assert [next(weights).value for _ in range(3)] == [0, 1, 2]
+        weights.close()
+        assert pair.master.read().value == 7
+        assert [each.outcome.value for each in itertools.islice(pair.master.poll({"read": 1.0}), 2)] == [7, 7]
+        for key, text in (
+            ("raed", "unknown command 'raed'; commands are weigh, cancel, read"),
+            ((None, "raed"), "unknown command 'raed'"),
+            ((3, "read"), r"\(3, 'read'\) names a node, but frames of read have no address; give 'read'"),
+        ):
+            with pytest.raises(ValueError, match=text):
+                pair.master.poll({key: 1.0})
