@@ -114,6 +114,19 @@ bus: {kind: master_slave, baud: 9600}
 _BUS = "bus: {kind: master_slave, nodes: 1..8, broadcast: 9}\n"
 
 FOUND = {
+    "reserved bytes alone that a value of the frame decides, of which a decoder in C read nothing": """\
+frame:
+  parts:
+    start: {role: constant, value: 7E}
+    state: {type: u8, default: 0}
+    code: {role: message, type: u8}
+    length: {role: length, type: u8, counts: [data]}
+    data: {role: payload, size: 0..40}
+    crc: {role: checksum, type: u8, algorithm: sum8, over: [state, code, data]}
+bus: {kind: master_slave}
+messages:
+  log: {id: 5, fields: {gap: {type: i32, reserved: true, if: {state: 0..3}}}}
+""",
     "a wrong count, whose fault showed more bytes the longer the pieces were": _COUNTED
     + "messages:\n  log: {id: 255, fields: {n: {type: u8, counts: a}, m: {type: u8, counts: b}, "
     'a: "bytes[0..1]", b: "u16[0..3]", c: u32}}\n',

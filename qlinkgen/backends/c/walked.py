@@ -23,6 +23,7 @@ from qlinkgen.plan.payload import (
     Presence,
     RecordsStep,
     RecordStep,
+    ReservedStep,
     RunStep,
     Segment,
     Step,
@@ -245,10 +246,14 @@ class WalkedDecoder(Decoder):
     def statements(self) -> list[str]:
         """Lines of the function body, without the last one."""
         numbers = numbers_of(self.payload)
-        self.reads = True
+        # A payload of reserved bytes alone has a size to check, and nothing to read.
+        steps = [step for each in self.payload.segments for step in each.steps]
+        runs = any(each.run or each.records for each in self.payload.segments)
+        self.reads = runs or not all(isinstance(step, ReservedStep) for step in steps)
         kind = self.init.removesuffix("_INIT").lower()
         whole = bool(self.payload.settable)
-        lines = [f"const {kind}_t defaults = {self.init};"] if whole else []
+        lines = [] if self.reads else ["(void)payload;"]
+        lines += [f"const {kind}_t defaults = {self.init};"] if whole else []
         lines += self._locals()
         lines += ["*message = defaults;"] if whole else []
         for each in self.payload.decided_by:
@@ -263,6 +268,7 @@ class WalkedDecoder(Decoder):
         """Statements that decode a record of variable size, and tell the bytes that it used."""
         numbers = numbers_of(self.payload)
         kind = self.init.removesuffix("_INIT").lower()
+        self.reads = True
         lines = [f"const {kind}_t defaults = {self.init};", "const size_t total = size;"]
         lines += [*self._locals(), "", "*message = defaults;", *self._all(numbers)]
         return [*lines, "*used = total - size;"]
@@ -322,7 +328,8 @@ class WalkedDecoder(Decoder):
                 self.refuse([f"size < {_length(segment, local)}"], "LENGTH")
             for step in segment.steps:
                 self._read(step)
-            self.lines += [f"payload += {_length(segment, local)};", f"size -= {_length(segment, local)};"]
+            self.lines += [f"payload += {_length(segment, local)};"] * self.reads
+            self.lines.append(f"size -= {_length(segment, local)};")
         inner, presence = self._flushed(), segment.presence
         if presence is None:
             return inner

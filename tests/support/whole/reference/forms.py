@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from tests.support.whole.reference.document import long_form
 from tests.support.whole.reference.notation import Doc
 
 
@@ -23,11 +24,12 @@ def _joined(spec: Doc, data: Doc) -> Doc:
     }
     for name, reply in forms.items():
         ((value, wanted),) = reply["if"].items()
-        fields: Doc = response.get("fields", response)
+        stated = long_form(response)
+        fields: Doc = stated["fields"]
         own = {each: _with(kind, {value: _reverse(wanted)}) for each, kind in fields.items()}
         other = {each: _with(kind, {value: wanted}) for each, kind in reply["fields"].items()}
         both = {**own, **other}
-        response = {**response, "fields": both} if "fields" in response else both
+        response = {**stated, "fields": both}
         spec = {**spec, "replies": {key: each for key, each in spec["replies"].items() if key != name}}
     return {**spec, "response": response} if forms else spec
 
