@@ -11,6 +11,7 @@
         * `NoReply`: no reply arrived in time (also a `TimeoutError`)
         * `BadReply`: a reply was corrupt or did not match the request
             * `IllegalCommand`: the device rejected the command as unknown
+        * `Refused`: the device refused the request with a reply of the schema
         * `CommandError`: the device rejected the command in its present state
         * `Collision`: the echo of a request was garbled by another sender
         * `LoadError`: loading a program failed
@@ -56,6 +57,7 @@ __all__ = [
     "PortLost",
     "PortMissing",
     "QlinkgenError",
+    "Refused",
     "SchemaError",
     "UnsuitableSchema",
 ]

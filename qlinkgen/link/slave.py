@@ -375,6 +375,9 @@ class SlaveEngine:
     def _queue(self, request: Framed, response: Message | Sequence[Message], now: float) -> None:
         """Encode one answer or several; the further ones follow the first."""
         several: Sequence[Message] = response if isinstance(response, list | tuple) else (response,)
+        for each in several:
+            if not hasattr(each, "NAME"):
+                raise TypeError(self._no_answer(request, each))
         asked = begun = request
         if (dialogue := self._dialogue) is not None:
             asked, begun = dialogue.asked, dialogue.request
@@ -388,6 +391,14 @@ class SlaveEngine:
             self._kept.answered(request, self._further)
         self._await_next(self._further, now)
         self._answer = self._further.pop(0) if several else b""
+
+    def _no_answer(self, request: Framed, given: object) -> str:
+        command = self._commands.get(type(request))
+        due = command.response.__name__ if command and command.response else "None"
+        return (
+            f"the handler of {request.NAME} returned {given!r}, not a message; return {due}, "
+            "or another reply of the command"
+        )
 
     def _checked(self, request: Framed, response: Message) -> bytes:
         """Encode one of several answers without an end."""

@@ -64,6 +64,16 @@ def test_a_slave_takes_commands_in_any_case() -> None:
     assert slave.told == [(codec.Mode.CURRENT, 12), (codec.Mode.VOLTAGE, 3), "Hi"]
 
 
+def test_a_handler_that_returns_no_message() -> None:
+    slave = Voltmeter()
+    slave.measure = lambda request, now: "12 V"  # type: ignore[method-assign]
+    with (
+        join(meter.Device, slave) as pair,
+        pytest.raises(TypeError, match=r"measure.request returned '12 V'.*return MeasureResponse"),
+    ):
+        pair.master.measure()
+
+
 def test_a_node_of_the_schema_alone_answers() -> None:
     with join(meter.Device, GenericNode(codec, 0)) as pair:
         answer = pair.master.identify()
