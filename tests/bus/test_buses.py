@@ -141,7 +141,7 @@ def test_polling(bus_pair: BusPairs) -> None:
         time, node, command, outcome = next(outcomes)
     assert (node, command, outcome.registers) == (NODE, "read_holding_registers", [0])
     assert time > start + 10
-    with pytest.raises(KeyError, match="nonsense"):
+    with pytest.raises(ValueError, match="unknown command 'nonsense'"):
         pair.master.poll({(NODE, "nonsense"): 1.0})
 
 

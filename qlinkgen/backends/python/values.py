@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
+from itertools import groupby
+from operator import itemgetter
 from typing import assert_never
 
 from qlinkgen.backends import python_text
 from qlinkgen.backends.python.layout import Call, indented, literal
 from qlinkgen.backends.python.names import attribute, held
 from qlinkgen.backends.python.place import Place
-from qlinkgen.backends.python.varied import condition, is_last, is_opened, of_attribute
+from qlinkgen.backends.python.varied import any_of, is_last, is_opened, of_attribute
 from qlinkgen.model.condition import Test
 from qlinkgen.model.frame import PartBits
 from qlinkgen.model.message import Value
@@ -115,9 +117,9 @@ def _decided(slot: Slot) -> list[tuple[Holder, Presence]]:
 def _usual(name: str, cases: Sequence[tuple[Holder, Presence]], place: Place) -> list[str]:
     """The statements that store the default of the case that earlier values decide on, None if of none."""
     lines, word = list[str](), "if"
-    for each, presence in cases:
-        test = condition([of_attribute(test) for test in presence.when], "self.{}")
-        lines += [f"{word} {test}:", f"    self.{name} = {default(each, place)}"]
+    usual = [(default(each, place), [*map(of_attribute, presence.when)]) for each, presence in cases]
+    for value, alike in groupby(usual, itemgetter(0)):
+        lines += [f"{word} {any_of((tests for _, tests in alike), 'self.{}')}:", f"    self.{name} = {value}"]
         word = "elif"
     return [*lines, "else:", f"    self.{name} = None"]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from qlinkgen.backends.python import integers
 from qlinkgen.backends.python.layout import bare, indented, wrapped
@@ -21,6 +21,12 @@ def condition(tests: Sequence[Test], number: str) -> str:
     """The expression of a condition; ``number`` is the format of the name of a value."""
     terms = [_test(each, number.format(each.value)) for each in tests]
     return " and ".join(terms) if len(terms) > 1 else bare(terms[0])
+
+
+def any_of(conditions: Iterable[Sequence[Test]], number: str) -> str:
+    """The expression of several conditions, one of which holds."""
+    found = [condition(tests, number) for tests in conditions]
+    return " or ".join(f"({each})" if len(found) > 1 and " and " in each else each for each in found)
 
 
 def of_attribute(test: Test) -> Test:
@@ -58,8 +64,7 @@ def closed(step: RecordsStep) -> str:
 
 
 def _opened(step: RecordsStep) -> str:
-    found = [condition([_inside(each) for each in tests], "each.{}") for tests in openings(step)]
-    return " or ".join(f"({each})" if len(found) > 1 and " and " in each else each for each in found)
+    return any_of(([_inside(each) for each in tests] for tests in openings(step)), "each.{}")
 
 
 def _inside(inner: Inner) -> Test:
