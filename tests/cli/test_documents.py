@@ -108,6 +108,7 @@ def shell(tmp_path: Path) -> Iterator[Shell]:
         "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}",
         "PYTHONPATH": str(REPOSITORY),
         "QLINKGEN": str(REPOSITORY),
+        "PYTEST_ADDOPTS": "",
     }
 
     shell = Shell(folder, environment)
