@@ -114,6 +114,19 @@ bus: {kind: master_slave, baud: 9600}
 _BUS = "bus: {kind: master_slave, nodes: 1..8, broadcast: 9}\n"
 
 FOUND = {
+    "a length before the stuffed bytes, whose fault in Python depended on the bytes after it": """\
+frame:
+  parts:
+    start: A5 A5
+    length: {type: u8, counts: data}
+    code: {role: message, type: u16}
+    data: {role: payload, size: 0..40}
+    crc: {type: u8, algorithm: sum8, over: [length, code, data]}
+  stuffing: {after: 0xA5, insert: 0x00, exempt: [start, length, code]}
+bus: {kind: master_slave}
+messages:
+  log: {id: 5, fields: {text: "bytes[0..8]"}}
+""",
     "reserved bytes alone that a value of the frame decides, of which a decoder in C read nothing": """\
 frame:
   parts:
@@ -418,3 +431,19 @@ def test_records_end_where_a_count_lies_beyond_the_longest_payload() -> None:
     heard = receiver(plan_of(protocol), "message")
     events = [event for byte in bytes((5, 3, 3)) + log.to_frame() for event in heard.feed(byte)]
     assert events[-1].decoded
+
+
+def test_a_header_with_a_wrong_constant_is_not_awaited() -> None:
+    """The first byte of a constant in two bytes was taken for all of it, and a right one."""
+    text = _HEAD + _PARTS.replace(
+        "    data:",
+        "    head: {type: u16, bits: {grade: 0..1, fixed: {at: 2..6, const: [0, 31]}}}\n    data:",
+    )
+    protocol, faults = loads(text + _BUS + "messages:\n  log: {id: 5, fields: {v: bytes}}\n", "tank.yaml")
+    assert protocol is not None, faults
+    codec = python.load(protocol)
+    frame = codec.Log(node=1, v=b"ab").to_frame()
+    decoder = codec.StreamDecoder("message")
+    wire = bytes.fromhex("7e 01 05 28 00 04") + frame
+    heard = [event for byte in wire for event in decoder.feed(bytes((byte,)))]
+    assert heard == [codec.Log(node=1, v=b"ab")]

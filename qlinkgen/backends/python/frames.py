@@ -499,14 +499,17 @@ def _number_checks(envelope: Envelope, part: Numeric, *, bare: bool) -> Iterator
     if isinstance(part, LeadingPart) and part.numbers:
         yield HeadCheck(f"head[:{end}] not in _BEGUN", no_frame, "constant")
     tests = (pieces.wrong(envelope, part, *source) for source in (("head",), pieces.BUFFER))
+    # A slice at the end of the buffer may be another number, and a right one.
+    sliced = part.size > 1 and not isinstance(part, AddressPart)
+    cut = f"len(buf) < start + {end} or " if sliced else ""
     for test, whole in zip(*tests, strict=True):
-        yield HeadCheck(f"len(head) >= {end} and {test}", no_frame, "constant", whole)
+        yield HeadCheck(f"len(head) >= {end} and {test}", no_frame, "constant", cut + whole)
     if bare and envelope.identifies(part) and envelope.known_at(part, envelope.id):
         yield from _bare_checks(envelope, part, f"len(head) >= {end} and", no_frame)
 
 
 def _length_check(frame: FramePlan, part: LengthPart, end: int) -> HeadCheck:
-    coded = isinstance(frame.transparency, FrameStuffing | Coded)
+    coded = isinstance(frame.transparency, FrameStuffing | Coded) and end > frame.transparency.front
     place = f"_take(buf, start, {end})[1]" if coded else f"start + {end}"
     bounds = "_MIN_LENGTH <= _length(head) <= _MAX_LENGTH"
     if frame.name:  # of several kinds: a call costs time
