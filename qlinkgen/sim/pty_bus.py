@@ -84,6 +84,8 @@ class PtyBus:
             PortLost: a port was lost or closed.
         """
         with self._running, contextlib.ExitStack() as held:
+            if threading.current_thread() is threading.main_thread():
+                held.enter_context(self._waker.woken_by_signals())
             for port in self._all_ports():
                 held.enter_context(port.hold(self._waker.wake))
             self._loop()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import socket
 import sys
+from collections.abc import Iterator
 from threading import RLock
 
 from qlinkgen.transport.forking import tell_of_forks
@@ -51,6 +53,23 @@ class Waker:
                         self._ends[0].recv(4096)
                     else:
                         os.read(self.descriptor, 4096)
+
+    @contextlib.contextmanager
+    def woken_by_signals(self) -> Iterator[None]:
+        """Let signals wake too, during a block in the main thread.
+
+        A signal that arrives right before the wait begins, or in another thread, does not interrupt it, and
+        Python runs its handler only after the wait.
+        """
+        if sys.platform == "win32":
+            end = self._ends[1].fileno()
+        else:
+            end = self._write_end
+        before = signal.set_wakeup_fd(end, warn_on_full_buffer=False)
+        try:
+            yield
+        finally:
+            signal.set_wakeup_fd(before)
 
     def close(self) -> None:
         """Close the pipe, once no thread waits on it. Closing twice is allowed."""

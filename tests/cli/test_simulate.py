@@ -7,6 +7,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -306,3 +307,22 @@ def test_wrong_addresses(words: tuple[str, ...], text: str, qlinkgen: Run) -> No
     result = qlinkgen("simulate", *words)
     assert result.code in {1, 2}
     assert text in result.err
+
+
+def test_a_signal_that_does_not_interrupt_the_wait() -> None:
+    """The system may deliver it in any thread, or before the wait begins: then the wait goes on."""
+    program = """
+import signal, threading, time
+from qlinkgen.cli.simulating import run_bus
+from qlinkgen.sim import Wire
+from qlinkgen.sim.pty_bus import PtyBus
+
+def end():
+    time.sleep(0.3)  # until the main thread waits
+    signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+
+threading.Thread(target=end).start()
+run_bus(PtyBus(Wire(baud=115200)), None, "a line")
+"""
+    command = [sys.executable, "-c", program]
+    subprocess.run(command, env=ENVIRONMENT, check=True, capture_output=True, timeout=PATIENCE)
