@@ -12,12 +12,12 @@ import importlib
 import math
 import struct
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 from time import process_time
-from types import ModuleType
+from types import FrameType, ModuleType
 from typing import Any, Literal
 
 from qlinkgen.backends.c import generate as generate_c
@@ -139,8 +139,25 @@ def generation(text: str, name: str) -> float:
     return process_time() - start
 
 
-def shares(name: str, version: Version) -> list[tuple[int, float]]:
-    """Numbers of messages, a quarter, half and all of a dialect, and the seconds to generate them."""
+def steps(text: str, name: str) -> int:
+    """Calls of functions to do the same, which do not depend on the machine."""
+    count = 0
+
+    def note(frame: FrameType, event: str, argument: object) -> None:  # of sys.setprofile
+        nonlocal count
+        count += event in {"call", "c_call"}
+
+    before = sys.getprofile()
+    sys.setprofile(note)
+    try:
+        generation(text, name)
+    finally:
+        sys.setprofile(before)
+    return count
+
+
+def shares(name: str, version: Version, cost: Callable[[str, str], float]) -> list[tuple[int, float]]:
+    """Numbers of messages, a quarter, half and all of a dialect, and what generating them costs."""
     path = source(name, version)
     names = [each.name for each in read_mavlink(path, Notes("x"), version=version).sections["messages"]]
     found = []
@@ -148,7 +165,7 @@ def shares(name: str, version: Version) -> list[tuple[int, float]]:
         chosen = names[::part]
         notes = Notes("x")
         text = written(read_mavlink(path, notes, version=version, only=chosen), notes)
-        found.append((len(chosen), min(generation(text, name) for _ in range(3))))
+        found.append((len(chosen), min(cost(text, name) for _ in range(2))))  # the first one fills caches
     return found
 
 
@@ -165,7 +182,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             every(found, options.values)
             seconds = process_time() - start
             print(f"{name}, MAVLink {version}: {len(found.model.messages)} messages agree, {seconds:.1f} s")
-        for count, seconds in shares(name, 2):
+        for count, seconds in shares(name, 2, generation):
             print(f"  {count} messages: {seconds:.2f} s to generate, {seconds / count * 1000:.1f} ms each")
     return 0
 
