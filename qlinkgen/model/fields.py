@@ -35,6 +35,11 @@ class Layout:
         return sum(each.min_size for each in self.fields)
 
     @cached_property
+    def usual(self) -> int:
+        """Size on the wire of a new record."""
+        return sum(each.usual_size for each in self.fields)
+
+    @cached_property
     def fixed(self) -> bool:
         """Whether the size is constant."""
         return all(each.fixed for each in self.fields)
@@ -192,6 +197,23 @@ class Field:
             case Scalar():
                 return self.type.least_size
             case Bits():
+                return self.type.size
+            case _:
+                assert_never(self.type)
+
+    @property
+    def usual_size(self) -> int:
+        """Size on the wire in a new message, not between separators."""
+        if not self.given:
+            return 0
+        match self.type:
+            case Blob() | Array():
+                return self.type.size_of(max(len(self.type.default), self.type.length.minimum))
+            case Records():
+                return self.type.length.minimum * self.type.layout.usual
+            case Record():
+                return self.type.layout.usual
+            case Scalar() | Bits():
                 return self.type.size
             case _:
                 assert_never(self.type)

@@ -80,6 +80,11 @@ class Message:
             return separated_size(self.fields, leading=self.leading)[0]
         return sum(field.min_size for field in self.fields)
 
+    @property
+    def usual_size(self) -> int:
+        """Size of the payload of a new message, not between separators."""
+        return sum(field.usual_size for field in self.fields)
+
     @cached_property
     def max_size(self) -> int:
         """Maximum size of the payload."""

@@ -355,8 +355,13 @@ class MessageBuilder:
     def _check_size(self, message: Message, path: Path) -> None:
         low, high = self._limits()
         assert high is not None
-        # The maximum of records of variable size is what the frame allows; their minimum may be more.
-        for what, size in (("at least", message.min_size), ("up to", message.max_size)):
+        # The maximum of records of variable size is what the frame allows; others may be more.
+        usual = message.usual_size if message.limit is not None else 0
+        for what, size in (
+            ("at least", message.min_size),
+            ("up to", message.max_size),
+            ("by default", usual),
+        ):
             if size > high:
                 hint = f"the frame allows {high}; shorten a field by {size - high}, or raise this limit"
                 self._error("payload-too-long", path, f"{message.name} has {what} {size} bytes", hint)
