@@ -195,7 +195,9 @@ class Opener:
             what = f"the id {shown(text.decode())} contains the separator of {message.name}"
             needs = (path, ("frame",))
             self._report.error(_RULE, (*path[:-1], "separator"), what, "use another separator", needs=needs)
-        taken, name = {field.name for field in message.fields}, self.name
+        taken = {name for field in message.fields for name in (field.name, field.slot)}
+        taken |= {value.name for value in message.values}
+        name = self.name
         while name in taken:
             name += "_"
         # No enum is called so.

@@ -114,6 +114,18 @@ bus: {kind: master_slave, baud: 9600}
 _BUS = "bus: {kind: master_slave, nodes: 1..8, broadcast: 9}\n"
 
 FOUND = {
+    "bits called like a message id of several lengths, which construct took for it": """\
+frame:
+  parts:
+    start: AA AA
+    length: {type: u8, counts: [code, data]}
+    code: {role: message, type: "text[1..4]"}
+    data: {role: payload, size: 0..20}
+    crc: {type: u8, algorithm: sum8, over: [length, code, data]}
+bus: {kind: link}
+messages:
+  level: {id: MEAS, fields: {state: {type: u8, bits: {code: 0..2, on: 7}}, value: u16}}
+""",
     "a length before the stuffed bytes, whose fault in Python depended on the bytes after it": """\
 frame:
   parts:
