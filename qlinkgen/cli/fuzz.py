@@ -9,6 +9,7 @@ import click
 
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.arguments import driven_protocol_argument, port_argument
+from qlinkgen.cli.asking import Asking, asking_options, master_at
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import addressed, crc_option, did_you_mean, load_protocol
@@ -18,28 +19,12 @@ from qlinkgen.cli.fuzz_run import RESULTS, Bench, Outcome, Tally
 from qlinkgen.cli.kinds import BUS, kind_of
 from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.cli.tables import Table
-from qlinkgen.cli.tracing import Printer, Trace, trace_option
-from qlinkgen.cli.wire_options import (
-    Parity,
-    baud_option,
-    counted,
-    echo_mode,
-    echo_option,
-    line_of,
-    matching,
-    open_usual,
-    parity_option,
-    slack_option,
-    stop_bits_option,
-)
+from qlinkgen.cli.wire_options import counted
 from qlinkgen.link.codec import Framed, is_message
-from qlinkgen.link.master import MasterEngine
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
 from qlinkgen.model.values import Json, whole_number
 from qlinkgen.plan import plan_of
-from qlinkgen.transport.blocking import BlockingMaster
-from qlinkgen.transport.conversation import timing_of
 
 
 @click.command("fuzz")
@@ -60,12 +45,7 @@ from qlinkgen.transport.conversation import timing_of
 @click.option(
     "--json", "as_json", is_flag=True, help="Print one JSON object per finding, and one at the end."
 )
-@baud_option
-@slack_option
-@echo_option
-@parity_option
-@stop_bits_option
-@trace_option
+@asking_options
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
@@ -77,13 +57,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     seed: int,
     chosen: tuple[int, ...],
     as_json: bool,
-    baud: int | None,
-    slack: float | None,
-    echo: str | None,
-    parity: Parity,
-    stop_bits: str,
-    traced: bool,
     crc: str | None,
+    asking: Asking,
 ) -> int:
     """Send valid, wrong and damaged frames to a device, and report what it does wrong.
 
@@ -114,22 +89,12 @@ def command(  # noqa: PLR0917  # click passes them by name
     address = _address(loaded, commands, node)
     codec = load_codec(loaded)
     cases = Cases(plan_of(loaded), codec, commands, address, seed, everything=everything)
-    trace = Trace(loaded, codec, Printer(loaded)) if traced else None
-    line = line_of(parity, stop_bits, trace.hear if trace else None)
-    try:
-        with open_usual(loaded, port, baud, line) as opened:
-            timing = timing_of(codec, opened, slack=slack)
-            engine = MasterEngine(codec, timing, echo=echo_mode(loaded, echo), accepts=matching(protocol))
-            probe = _probe(codec, cases)
-            bench = Bench(engine, BlockingMaster(engine, opened), probe)
-            if not bench.is_there():
-                raise Failure(
-                    f"the device does not answer {probe.NAME}; check it with `qlinkgen send`", WRONG
-                )
-            return _run(bench, cases, chosen or range(count), as_json=as_json)
-    finally:
-        if trace is not None:
-            trace.end()
+    with master_at(port, protocol, loaded, codec, asking) as (engine, master):
+        probe = _probe(codec, cases)
+        bench = Bench(engine, master, probe)
+        if not bench.is_there():
+            raise Failure(f"the device does not answer {probe.NAME}; check it with `qlinkgen send`", WRONG)
+        return _run(bench, cases, chosen or range(count), as_json=as_json)
 
 
 def usable(command: Command) -> bool:

@@ -17,6 +17,7 @@ from qlinkgen.cli.arguments import (
     message_argument,
     port_argument,
 )
+from qlinkgen.cli.asking import Asking, asking_options, master_at
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.codec import fields, load_codec
 from qlinkgen.cli.common import crc_option, load_protocol, on_terminal, warn
@@ -25,30 +26,14 @@ from qlinkgen.cli.encode import compose
 from qlinkgen.cli.kinds import BUS, is_shipped, kind_of
 from qlinkgen.cli.send_bus import check_request
 from qlinkgen.cli.tables import Table
-from qlinkgen.cli.tracing import Printer, Trace, trace_option
-from qlinkgen.cli.wire_options import (
-    Parity,
-    baud_option,
-    echo_mode,
-    echo_option,
-    line_of,
-    matching,
-    open_usual,
-    parity_option,
-    parse_nodes,
-    slack_option,
-    stop_bits_option,
-)
+from qlinkgen.cli.wire_options import parse_nodes
 from qlinkgen.link.codec import Framed
 from qlinkgen.link.events import Event, Sent
-from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.survey import Present, survey
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
 from qlinkgen.model.values import Json
-from qlinkgen.transport.blocking import BlockingMaster
-from qlinkgen.transport.conversation import timing_of
 
 #: More nodes are asked only if they are given: each silent one takes a deadline.
 MOST = 256
@@ -64,12 +49,7 @@ Question = tuple[str, tuple[str, ...]]
 @assignments_argument
 @click.option("--nodes", metavar="LIST", help="Nodes to ask: 3, 1-16 or 1,3,5-7; by default all.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line instead of a table.")
-@baud_option
-@slack_option
-@echo_option
-@parity_option
-@stop_bits_option
-@trace_option
+@asking_options
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
@@ -78,13 +58,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     assignments: tuple[str, ...],
     nodes: str | None,
     as_json: bool,
-    baud: int | None,
-    slack: float | None,
-    echo: str | None,
-    parity: Parity,
-    stop_bits: str,
-    traced: bool,
     crc: str | None,
+    asking: Asking,
 ) -> int:
     """Ask every node of a bus with one request, and print those that answer.
 
@@ -108,17 +83,11 @@ def command(  # noqa: PLR0917  # click passes them by name
     codec = load_codec(loaded)
     questions = [(message, assignments)] if message else questions_of(protocol, loaded)
     asked = [_asker(loaded, codec, question, numbers[0]) for question in questions]
-    trace = Trace(loaded, codec, Printer(loaded)) if traced else None
-    line = line_of(parity, stop_bits, trace.hear if trace else None)
-    try:
-        with open_usual(loaded, port, baud, line) as opened, _progress() as show:
-            timing = timing_of(codec, opened, slack=slack)
-            engine = MasterEngine(codec, timing, echo=echo_mode(loaded, echo), accepts=matching(protocol))
-            master = BlockingMaster(engine, opened, on_event=show)
-            found = master.run(survey(numbers, (asked[0], *asked), lambda each: each))
-    finally:
-        if trace is not None:
-            trace.end()
+    with (
+        _progress() as show,
+        master_at(port, protocol, loaded, codec, asking, on_event=show) as (_, master),
+    ):
+        found = master.run(survey(numbers, (asked[0], *asked), lambda each: each))
     if not found:
         look = f"`qlinkgen doctor {protocol} {port}`"
         warn(f"no node answers on {port}; check power, wiring and --baud, and {look}")

@@ -8,30 +8,15 @@ from pathlib import Path
 import click
 
 from qlinkgen.cli.arguments import driven_protocol_argument, port_argument
+from qlinkgen.cli.asking import Asking, asking_options, master_at
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.kinds import BUS, kind_of
 from qlinkgen.cli.shell_lines import Lines, Reader, perform_all
-from qlinkgen.cli.tracing import Printer, Trace, trace_option
-from qlinkgen.cli.wire_options import (
-    Parity,
-    attempts_option,
-    baud_option,
-    echo_mode,
-    echo_option,
-    line_of,
-    matching,
-    open_usual,
-    parity_option,
-    slack_option,
-    stop_bits_option,
-)
-from qlinkgen.link.master import MasterEngine
+from qlinkgen.cli.wire_options import attempts_option
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import whole_number
-from qlinkgen.transport.blocking import BlockingMaster
-from qlinkgen.transport.conversation import timing_of
 
 
 @click.command("shell")
@@ -40,26 +25,16 @@ from qlinkgen.transport.conversation import timing_of
 @click.option(
     "--node", "--address", "node", metavar="N", help="The node of requests without one of their own."
 )
-@baud_option
+@asking_options
 @attempts_option
-@slack_option
-@echo_option
-@parity_option
-@stop_bits_option
-@trace_option
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
     port: str,
     node: str | None,
-    baud: int | None,
     attempts: int,
-    slack: float | None,
-    echo: str | None,
-    parity: Parity,
-    stop_bits: str,
-    traced: bool,
     crc: str | None,
+    asking: Asking,
 ) -> int:
     """Send requests to a bus line by line, and print the responses with their units.
 
@@ -81,12 +56,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     if node is not None and number is None:
         raise Failure(f"--node {node}: not a whole number")
     codec = load_codec(loaded)
-    trace = Trace(loaded, codec, Printer(loaded)) if traced else None
-    line = line_of(parity, stop_bits, trace.hear if trace else None)
-    with open_usual(loaded, port, baud, line) as opened:
-        timing = timing_of(codec, opened, slack=slack, attempts=attempts)
-        engine = MasterEngine(codec, timing, echo=echo_mode(loaded, echo), accepts=matching(protocol))
-        lines = Lines(loaded, codec, BlockingMaster(engine, opened), number)
+    with master_at(port, protocol, loaded, codec, asking, attempts=attempts) as (_, master):
+        lines = Lines(loaded, codec, master, number)
         on_terminal = on_terminal_input()
         fine = perform_all(lines, _editor(loaded, lines) if on_terminal else _piped)
     return FINE if fine or on_terminal else WRONG
