@@ -44,10 +44,11 @@ class Calls(Watched, BlockingMaster):
         answer: R = reply.response
         return answer
 
-    def ask_any(self, request: Framed, *responses: type[Framed]) -> Any:  # noqa: ARG002
+    def ask_any(self, request: Framed, *responses: type[R]) -> R:  # noqa: ARG002
         """Send a request and return its response of one of several classes."""
         reply = self.transact(request)
-        return reply.response
+        answer: R = reply.response
+        return answer
 
     def ask_each(self, request: Framed, response: type[R]) -> dict[int, R | None]:  # noqa: ARG002
         """Send a request and return the response of each node in a list; None is one that is missing."""
@@ -181,7 +182,7 @@ class Node(Generic[B]):
         """As `ask` of the bus."""
         return self.bus.ask(request, response)
 
-    def ask_any(self, request: Framed, *responses: type[Framed]) -> Any:
+    def ask_any(self, request: Framed, *responses: type[R]) -> R:
         """As `ask_any` of the bus."""
         return self.bus.ask_any(request, *responses)
 

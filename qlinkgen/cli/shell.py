@@ -25,8 +25,8 @@ from qlinkgen.model.values import whole_number
 @click.option(
     "--node", "--address", "node", metavar="N", help="The node of requests without one of their own."
 )
-@asking_options
 @attempts_option
+@asking_options
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,

@@ -22,7 +22,7 @@ _REFERENCE, _BYTES, _FRACTION = 0, 1, 2
 _PACKAGE = "qlinkgen.model."
 #: Names of containers, which no class has.
 _TUPLE, _MAPPING, _DICT = "()", "{=}", "{}"
-_MAPPINGS: Mapping[str, Callable[[dict[Any, Any]], Mapping[Any, Any]]] = {
+_MAPPINGS: Mapping[str, Callable[[dict[object, object]], Mapping[object, object]]] = {
     _MAPPING: MappingProxyType,
     _DICT: dict,
 }
@@ -124,5 +124,5 @@ def _class(name: str) -> tuple[type[object], tuple[str, ...]]:
     return found, _arguments(found)
 
 
-def _arguments(cls: type[Any]) -> tuple[str, ...]:
+def _arguments(cls: type) -> tuple[str, ...]:
     return tuple(each.name for each in fields(cls) if each.init)

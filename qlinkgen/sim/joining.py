@@ -50,7 +50,7 @@ def join(
     faults: FaultPlan | None = None,
     turnaround: float = 0.0,
     own: Node | None = None,
-    **options: Any,  # of the class, which checks them
+    **options: object,  # of the class, which checks them
 ) -> Iterator[Joined[M]]:
     """Join a class of a generated bus module with slaves during a block, and close it afterwards.
 
@@ -88,7 +88,7 @@ def join_at(
     *handlers: Node,
     turnaround: float = 0.0,
     own: Node | None = None,
-    **options: Any,  # of the class, which checks them
+    **options: object,  # of the class, which checks them
 ) -> Iterator[Joined[M]]:
     """Join a master at a port with slaves on its line during a block, and close the master afterwards.
 
