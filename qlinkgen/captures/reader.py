@@ -1,10 +1,11 @@
-"""Reads pcapng files, also those that end in the middle of a block."""
+"""Reads pcapng files, also those that end in the middle of a block or have damaged ones."""
 
 from __future__ import annotations
 
 import os
+import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import BinaryIO, Literal, NamedTuple
 
 from qlinkgen.captures.pcapng import (
@@ -22,15 +23,28 @@ from qlinkgen.captures.pcapng import (
     RESOLUTION,
     SECTION,
     SPEED,
+    USER0,
     Direction,
     Interface,
     Packet,
 )
+from qlinkgen.captures.window import Window
 from qlinkgen.errors import CaptureError
 
 Order = Literal["<", ">"]
 _WAYS: dict[int, Direction] = {number: way for way, number in DIRECTIONS.items()}
 _NANO = 10**9
+#: Bytes of a damaged file that are searched first for the next block.
+_CHUNK = 1 << 12
+#: Most wrong blocks of a file that is read on.
+_MOST_WRONG = 1000
+#: The first word of blocks that matter, by the byte order.
+_KINDS: dict[Order, re.Pattern[bytes]] = {
+    order: re.compile(
+        b"|".join(re.escape(struct.pack(f"{order}I", kind)) for kind in (PACKET, INTERFACE, SECTION))
+    )
+    for order in ("<", ">")
+}
 
 
 class _Clock(NamedTuple):
@@ -54,47 +68,75 @@ class Reader:
         skipped: number of blocks passed over: those of other kinds, such as statistics.
     """
 
-    def __init__(self, file: BinaryIO) -> None:
-        """Read a binary file from its start; it need not be seekable."""
+    def __init__(self, file: BinaryIO, wrong: Callable[[int, str], None] | None = None) -> None:
+        """Read a binary file from its start; it need not be seekable.
+
+        Args:
+            file: the file.
+            wrong: called with the offset of a wrong block and what is wrong with it; the next block is then
+                searched. None: a wrong block raises an error.
+        """
         self.interfaces: list[Interface] = []
         self.whole = False
         self.skipped = 0
         self._clocks: list[_Clock] = []
-        self._file = file
+        self._file = Window(file)
+        self._told = wrong
         self._order: Order = "<"
-        self._at = 0  # offset of the block
+        #: Offset of the last block.
+        self.at = 0
+        self._wrongs = 0
 
     def __iter__(self) -> Iterator[Packet]:
         """Return the packets in the order of the file.
 
         Raises:
-            CaptureError: the file is not a pcapng file, or a block is wrong.
+            CaptureError: the file is not a pcapng file, or a block is wrong and `wrong` is None, or more
+                than 1000 are.
         """
-        while (block := self._block()) is not None:
-            kind, body = block
-            if kind == PACKET:
-                yield self._packet(body)
-            elif kind == INTERFACE:
-                self._interface(body)
-            elif kind == SECTION:
-                self._section(body)
-            else:
-                self.skipped += 1
-            self._at += len(body) + FRAME
+        while True:
+            self._file.keep()
+            self.at = self._file.at
+            try:
+                block = self._block()
+                if block is None:
+                    return
+                packet = self._read(*block)
+            except CaptureError as error:
+                self._wrongs += 1
+                if self._told is None or self._wrongs > _MOST_WRONG:
+                    raise
+                self._told(self.at, str(error))
+                self._search()
+                continue
+            if packet is not None:
+                yield packet
+
+    def _read(self, kind: int, body: bytes) -> Packet | None:
+        """Take a block; return its packet, None if it is of another kind."""
+        if kind == PACKET:
+            return self._packet(body)
+        if kind == INTERFACE:
+            self._interface(body)
+        elif kind == SECTION:
+            self._section(body)
+        else:
+            self.skipped += 1
+        return None
 
     def _block(self) -> tuple[int, bytes] | None:
         """Return type and body of the next block, None at the end."""
-        head = self._file.read(8)
-        if self._at == 0 and head[:4] != struct.pack("<I", SECTION)[: len(head)]:
+        head = self._file.take(8)
+        if self.at == 0 and head[:4] != struct.pack("<I", SECTION)[: len(head)]:
             raise self._wrong(
                 f"begins with {head[:4].hex(' ')}, not with a section header: not a pcapng file"
             )
         if len(head) < 8:
-            self.whole = not head and self._at > 0
+            self.whole = not head and self.at > 0
             return None
         (kind,) = self._unpack("I", head)
         if kind == SECTION:
-            magic = self._file.read(4)
+            magic = self._file.take(4)
             if len(magic) < 4:
                 return None
             self._set_order(magic)
@@ -103,13 +145,48 @@ class Reader:
         (length,) = self._unpack("I", head[4:])
         self._check_length(length, FRAME + len(magic))
         rest = length - len(head) - len(magic)
-        data = magic + self._file.read(rest)
+        data = magic + self._file.take(rest)
         if len(data) < rest + len(magic):
+            if self._told is not None and self._follows(head + data) is not None:
+                raise self._wrong(f"has length {length}, and the file ends before")
             return None
         (again,) = self._unpack("I", data[-4:])
         if again != length:
             raise self._wrong(f"begins with length {length} and ends with {again}")
         return kind, data[:-4]
+
+    def _search(self) -> None:
+        """Go to the block after a wrong one: over it if only its body is wrong, else to the next whole one.
+
+        A place is taken for a block where its kind is known and both its lengths are the same. Only so many
+        bytes are searched as a block can have.
+        """
+        self._file.go(self.at)
+        taken = self._file.take(_CHUNK)
+        if size := self._whole(taken, 0):
+            self._file.go(self.at + size)
+            return
+        at = self._follows(taken)
+        while at is None and len(taken) < MOST and (more := self._file.take(len(taken))):
+            taken += more
+            at = self._follows(taken)
+        self._file.go(self.at + (len(taken) if at is None else at))
+
+    def _follows(self, taken: bytes) -> int | None:
+        """Return the offset of a whole block in bytes, after the first one; None without one."""
+        places = (each.start() for each in _KINDS[self._order].finditer(taken, 1))
+        return next((at for at in places if self._whole(taken, at)), None)
+
+    def _whole(self, taken: bytes, at: int) -> int:
+        """Return the length of a block of a known kind, 0 if there is none."""
+        head = taken[at : at + 8]
+        if len(head) < 8:
+            return 0
+        _, length = self._unpack("II", head)
+        if not FRAME <= length <= MOST or length % 4:
+            return 0
+        end = taken[at + length - 4 : at + length]
+        return length if len(end) == 4 and self._unpack("I", end) == (length,) else 0
 
     def _check_length(self, length: int, least: int) -> None:
         if length < least or length > MOST or length % 4:
@@ -156,7 +233,13 @@ class Reader:
             raise self._short(body)
         number, high, low, size, _ = self._unpack("IIIII", body)
         if number >= len(self.interfaces):
-            raise self._wrong(f"names interface {number} of {len(self.interfaces)}, counted from 0")
+            error = self._wrong(f"names interface {number} of {len(self.interfaces)}, counted from 0")
+            if self._told is None:
+                raise error
+            self._told(self.at, f"{error}; its packet is read as one of a port without name")
+            port, clock = Interface("", USER0), _Clock()
+        else:
+            port, clock = self.interfaces[number], self._clocks[number]
         if size > len(body) - 20:
             raise self._wrong(f"states {size} bytes of data and has {len(body) - 20}")
         comments: list[str] = []
@@ -167,8 +250,8 @@ class Reader:
             elif code == FLAGS:
                 (flags,) = self._unpack("I", self._sized(value, 4))
                 direction = _WAYS.get(flags & 3)
-        at = self._clocks[number].nanoseconds(high << 32 | low)
-        return Packet(at, body[20 : 20 + size], self.interfaces[number], direction, tuple(comments))
+        at = clock.nanoseconds(high << 32 | low)
+        return Packet(at, body[20 : 20 + size], port, direction, tuple(comments))
 
     def _options(self, data: bytes) -> Iterator[tuple[int, bytes]]:
         """Return code and value of each option; their end may be missing."""
@@ -193,7 +276,7 @@ class Reader:
         return self._wrong(f"has {len(body)} bytes, less than its kind needs")
 
     def _wrong(self, text: str) -> CaptureError:
-        return CaptureError(f"the block at offset {self._at} {text}")
+        return CaptureError(f"the block at offset {self.at} {text}")
 
 
 def read_pcapng(path: str | os.PathLike[str]) -> Iterator[Packet]:
