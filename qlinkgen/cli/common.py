@@ -116,6 +116,15 @@ def parse_hex(text: str, what: str = "HEX") -> bytes:
         raise Failure(f"{what}: {error.message} (character {error.at + 1})") from None
 
 
+def is_hex(text: str) -> bool:
+    """Whether a text is hex."""
+    try:
+        HexReader().feed(f"{text}\n")
+    except HexError:
+        return False
+    return True
+
+
 def on_terminal(stream: IO[str] | None = None) -> bool:
     """Whether to use colours and fit the width."""
     if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":

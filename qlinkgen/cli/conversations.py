@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import ModuleType
+from typing import Protocol as TypingProtocol
+from typing import cast
 
 from qlinkgen.cli.codec import MessageObject
 from qlinkgen.cli.streams import Bad, Event, OneWay
@@ -122,6 +124,29 @@ class Answers:
         if self._waiting:
             text = f"{len(self._waiting)} bytes; a response to {self._asked.NAME} has {self._size}"
             yield Bad("truncated", self._offset, bytes(self._waiting), text)
+
+
+class Answer(TypingProtocol):
+    """A response whose check value covers its request."""
+
+    def to_frame(self, request: Asked) -> bytes:
+        """Return its bytes on the wire."""
+
+
+class PacketWire:
+    """Tells the bytes of the messages of a conversation: those of an answer depend on its request."""
+
+    def __init__(self, protocol: Protocol, asked: Asked | None = None) -> None:
+        """``asked``: the request of the first answers."""
+        self._requests = {message.name for message in protocol.received("request")}
+        self._asked = asked
+
+    def __call__(self, message: MessageObject) -> bytes:
+        """Return the bytes of the next message, without any if its request is not known."""
+        if message.NAME in self._requests:
+            self._asked = message
+            return message.to_frame()
+        return b"" if self._asked is None else cast(Answer, message).to_frame(self._asked)
 
 
 def answer_size(plan: Plan, asked: Asked) -> int:

@@ -2,49 +2,43 @@
 
 from __future__ import annotations
 
-import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from io import BufferedReader
-from itertools import chain
-from types import ModuleType
-from typing import cast
+from collections.abc import Iterable
+from dataclasses import replace
+from decimal import Decimal
+from pathlib import Path
 
 import click
 
+from qlinkgen.captures.records import Problems, Record
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.arguments import protocol_argument
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
+from qlinkgen.cli.capture_options import CaptureOptions, capture_options
 from qlinkgen.cli.codec import fields, load_codec
 from qlinkgen.cli.common import (
     crc_option,
+    is_hex,
     load_protocol,
     parse_hex,
-    turned_message,
     version_option,
     warn,
     warn_unconfirmed,
 )
-from qlinkgen.cli.conversations import Answers, Conversation
-from qlinkgen.cli.encode import asked, proving
-from qlinkgen.cli.hex_text import HexError, HexReader
-from qlinkgen.cli.streams import Alone, Bad, Event, Stream, open_stream
+from qlinkgen.cli.decoder import Decoder
+from qlinkgen.cli.streams import Bad, Event
+from qlinkgen.cli.traffic import Place, Placed
 from qlinkgen.link.codec import Fault, Message
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import address_attribute, attribute, record_key
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Means, Reply
 from qlinkgen.model.values import Json, to_json
-from qlinkgen.plan.framing import frame_plan
-
-CHUNK = 65536
-_LINE = re.compile(rb"[^\n]*\n|[^\n]+")
-_COMMENT = re.compile(rb"#[^\n]*")
 
 
 @click.command("decode")
 @protocol_argument
-@click.argument("hex_", metavar="[HEX|-]...", nargs=-1)
+@click.argument("hex_", metavar="[HEX|FILE|-]...", nargs=-1)
 @click.option(
     "--direction", type=click.Choice(["request", "response"]), help="Direction of the frames; see above."
 )
@@ -52,7 +46,8 @@ _COMMENT = re.compile(rb"#[^\n]*")
     "--request", "request", metavar="HEX", help="The request of the responses, where these depend on it."
 )
 @click.option("--message", "name", metavar="MESSAGE", help="What HEX is, where only its turn tells it.")
-@click.option("--raw", is_flag=True, help="Standard input is binary, not hex text.")
+@click.option("--strict", is_flag=True, help="Exit code 1 for any bad frame, or anything that is not read.")
+@capture_options
 @crc_option
 @version_option
 def command(  # noqa: PLR0917  # click passes them by name
@@ -61,136 +56,134 @@ def command(  # noqa: PLR0917  # click passes them by name
     direction: Direction | None,
     request: str | None,
     name: str | None,
-    raw: bool,
+    strict: bool,
+    capture: CaptureOptions,
     crc: str | None,
     version: str | None,
 ) -> int:
-    """Print every frame of a stream as a JSON object; bytes between frames are skipped.
+    """Print every frame of captures as a JSON object; bytes between frames are skipped.
 
-    - (or no HEX) reads hex text from standard input as it arrives; comments go from # to the end of the line.
-    White space separates words of digit pairs, each with or without 0x; a single digit is a byte too. A bad
-    frame is an object {"error": {"kind", "offset", "raw", "message"}}. Exit code 1 if there is a bad frame,
-    or no frame.
+    Arguments that are all hex are bytes: white space separates words of digit pairs, each with or without 0x;
+    a single digit is a byte too. A FILE that is so named is written ./dead. - (or nothing) reads standard
+    input as it arrives.
 
-    Most frames do not state their direction. Without --direction, a frame that is valid in only one direction
-    has that direction; one that is valid in both is the response if it directly follows a request of the same
-    command and node, else the request. Packets without --direction are a conversation: after a request, a
-    response if its check value fits, else the next request; with --direction response they need --request.
-    Where only a silence ends a frame, each line of standard input is one frame, and so are all HEX together.
+    A capture is raw bytes; hex text, as printed by xxd, hexdump and od, with 0x, \\x, commas or colons, or as
+    an array in C; a log whose lines have a time, a direction or both; an export of the analysers of Saleae or
+    sigrok; pcap or pcapng. Any of them may be compressed by gzip or Zstandard. The format is found from the
+    frames that each reading gives; --capture-format names it.
+
+    "offset" is where a frame begins: its first byte, or the line or packet of the file with it. "time" is in
+    seconds, since 1970 where the capture has dates. A bad frame is an object {"error": {"kind", "offset",
+    "raw", "message"}}. What cannot be read of a file is said at its end. Exit code 1 without any frame, and
+    for a bad one in HEX or with --strict.
+
+    Most frames do not state their direction. Without --direction, a capture may state it; else a frame that
+    is valid in only one direction has that direction; one that is valid in both is the response if it follows
+    a request of the same command and node directly, else the request. Packets without --direction are a
+    conversation: after a request, a response if its check value fits, else the next request; with --direction
+    response they need --request. Where only a silence ends a frame, each line or packet is one frame, and so
+    are all HEX together; single bytes with times belong together until the line was idle.
 
     \b
     qlinkgen decode qlink a5a504210315e8
+    qlinkgen decode qlink line.pcapng
     qlinkgen decode qlink --direction response - < capture.txt
     qlinkgen decode trio --raw < /dev/ttyUSB0
     qlinkgen decode mc1231a --direction response --request 4a 0012d687d6e3
     """  # noqa: D301  # click takes the character \b for "do not wrap"
-    chunks = _input(hex_, raw=raw)
+    given = _given(hex_, capture)
     loaded = load_protocol(protocol, crc, version)
     codec = load_codec(loaded, plain=crc is None)
-    if name is not None:
-        message = turned_message(loaded, name)
-        stream: Stream = Alone(codec, message.name, proving(loaded, codec, message, request))
-    else:
-        stream = _stream(loaded, codec, direction, request)
-    gaps = frame_plan(loaded.frame).silent
-    if gaps and raw:
-        what = f"only a silence ends a frame of {loaded.name}, and raw bytes have no times"
-        raise Failure(f"{what}; give hex text with one frame on each line")
-    printer = _Printer(loaded)
-    for chunk in chunks:
-        if chunk is not None:
-            printer.show(stream.feed(chunk), len(chunk))
-        elif gaps:
-            printer.show(stream.finish())
-    printer.show(stream.finish())
-    return printer.result()
+    decoder = Decoder(loaded, codec, direction, request, name, capture.baud)
+    printer = _Printer(loaded, several=not isinstance(given, bytes) and len(given) > 1)
+    if isinstance(given, bytes):
+        printer.show(decoder.traffic({}, exact=True).decode([Record(given, 0)]))
+        return printer.result(len(given), strict=True)
+    from qlinkgen.cli.capture_input import Capture  # noqa: PLC0415  # not needed for HEX
+
+    size = 0
+    for path in given:
+        file = Capture(loaded, decoder, capture)
+        printer.show(file.frames(path), path)
+        printer.complain(path, file.problems)
+        size += file.size
+    return printer.result(size, strict=strict)
 
 
-def _stream(
-    protocol: Protocol, codec: ModuleType, direction: Direction | None, request: str | None
-) -> Stream:
-    if direction and direction not in protocol.directions:
-        raise Failure(f"{protocol.name} has neither requests nor responses; omit --direction {direction}")
-    packets = frame_plan(protocol.frame).needs_request
-    told = packets or protocol.carrier is not None
-    if request is not None and not (told and direction != "request"):
-        raise Failure("--request requires responses that only their request tells apart; omit it")
-    if not packets or direction == "request":
-        first = None if request is None else asked(protocol, codec, request)
-        return open_stream(protocol, codec, direction, first)
-    if direction is None and request is None:
-        return Conversation(protocol, codec)
-    return Answers(protocol, codec, asked(protocol, codec, request))
-
-
-def _input(words: tuple[str, ...], *, raw: bool) -> Iterable[bytes | None]:
-    """The bytes, and None after each line of hex text."""
-    if words and words != ("-",):
-        if raw:
-            raise Failure("--raw reads bytes from standard input; omit HEX or --raw")
-        return [parse_hex(" ".join(words))]
+def _given(words: tuple[str, ...], capture: CaptureOptions) -> bytes | tuple[str, ...]:
+    """Return the bytes, or the names of files."""
+    files = [each for each in words if not is_hex(each) and (each == "-" or _is_file(each))]
+    if words and not files:
+        if capture.format == "raw":
+            raise Failure("raw bytes are those of a file or of standard input; omit HEX, --raw and raw")
+        return parse_hex(" ".join(words))
+    for each in words:
+        if each not in files:
+            raise Failure(f"'{each}' is not a file; write either HEX or the names of files")
+    if words.count("-") > 1:
+        raise Failure("- is standard input, which is read once; name it once")
     if not words and sys.stdin.isatty():
-        raise Failure("nothing to decode; give HEX, or - to read it from standard input")
-    return _read_raw() if raw else _read_hex()
+        raise Failure("nothing to decode; give HEX or FILE, or - to read standard input")
+    return words or ("-",)
 
 
-def _read_raw() -> Iterator[bytes]:
-    while chunk := cast(BufferedReader, sys.stdin.buffer).read1(CHUNK):
-        yield chunk
-
-
-def _read_hex() -> Iterator[bytes | None]:
-    """Yield bytes as soon as both digits are known, and None after each line; a chunk may end anywhere.
-
-    The bytes before a wrong character are yielded before the error is raised.
-    """
-    reader, comment, line = HexReader(), False, 1
-    for chunk in chain(_read_raw(), (b"\n",)):
-        text = _COMMENT.sub(b"", b"#" + chunk if comment else chunk)
-        comment = b"#" in chunk[chunk.rfind(b"\n") + 1 :] or (comment and b"\n" not in chunk)
-        for piece in _LINE.findall(text):
-            try:
-                yield reader.feed(piece.decode("ascii", "surrogateescape"))
-            except HexError as error:
-                yield error.before
-                what = f"standard input, line {line}: {error.message}"
-                raise Failure(f"{what}; comments begin with #") from None
-            if piece.endswith(b"\n"):
-                line += 1
-                yield None
+def _is_file(name: str) -> bool:
+    try:
+        return Path(name).exists()
+    except (OSError, ValueError):  # too long for a name, or with a zero
+        return False
 
 
 class _Printer:
-    """Prints events immediately, and counts them for the exit code."""
+    """Prints frames immediately, and counts them for the exit code."""
 
-    def __init__(self, protocol: Protocol) -> None:
+    def __init__(self, protocol: Protocol, *, several: bool) -> None:
         self._protocol = protocol
-        self._bytes = self._good = self._bad = 0
+        self._several = several  # there are several files: objects name theirs
+        self._good = self._bad = self._unread = 0
         self._warned: set[str] = set()
 
-    def show(self, events: Iterable[Event], size: int = 0) -> None:
-        """Print events and flush, so that the reader of a pipe sees them at once."""
-        self._bytes += size
-        for event in events:
-            sys.stdout.write(f"{jsonlines.line(self._record(event))}\n")
-        sys.stdout.flush()
+    def show(self, frames: Iterable[Placed], file: str = "") -> None:
+        """Print the frames of a file; those of standard input are seen at once by the reader of a pipe."""
+        for event, place in frames:
+            record = self._record(event, place)
+            if self._several:
+                record["file"] = file
+            sys.stdout.write(f"{jsonlines.line(record)}\n")
+            if file == "-":
+                sys.stdout.flush()
 
-    def result(self) -> int:
-        """The exit code."""
+    def complain(self, file: str, problems: Problems) -> None:
+        """Say what could not be read of a file."""
+        name = "standard input" if file == "-" else file
+        for each in problems.kept:
+            where = f"line {each.line}" if each.line else f"offset {each.offset}"
+            warn(f"{name}, {where}: {each.text}")
+        if more := problems.count - len(problems.kept):
+            warn(f"{name}: {more} further places could not be read")
+        self._unread += problems.count
+
+    def result(self, size: int, *, strict: bool) -> int:
+        """Return the exit code; `size`: bytes in all."""
         if not self._good and not self._bad:
-            seen = f"no frame in {self._bytes} bytes" if self._bytes else "no input"
+            seen = f"no frame in {size} bytes" if size else "no input"
             warn(f"{seen}; `qlinkgen explain {self._protocol.name} HEX` looks for the cause")
-        return FINE if self._good and not self._bad else WRONG
+        return FINE if self._good and not (strict and (self._bad or self._unread)) else WRONG
 
-    def _record(self, event: Event) -> Mapping[str, Json]:
+    def _record(self, event: Event, place: Place) -> dict[str, Json]:
         if isinstance(event, Bad):
             self._bad += 1
-            return error_record(event)
-        self._good += 1
-        if event.NAME not in self._warned:
-            self._warned.add(event.NAME)
-            warn_unconfirmed(self._protocol, self._protocol.by_name[event.NAME])
-        return message_record(self._protocol, event)
+            record: dict[str, Json] = error_record(replace(event, offset=place.offset))
+        else:
+            self._good += 1
+            if event.NAME not in self._warned:
+                self._warned.add(event.NAME)
+                warn_unconfirmed(self._protocol, self._protocol.by_name[event.NAME])
+            record = message_record(self._protocol, event)
+            record["offset"] = place.offset
+        if place.at is not None:
+            record["time"] = Decimal(place.at).scaleb(-9)
+        return record
 
 
 def message_record(protocol: Protocol, found: Message) -> dict[str, Json]:

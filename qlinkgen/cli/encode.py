@@ -128,13 +128,16 @@ class _Record:
     address: str | None = None
 
 
+#: What decode says of a message besides its values.
+_ASIDE = ("refused", "request_seen", "offset", "time", "file")
+
+
 def _record(protocol: Protocol, given: Mapping[str, Json]) -> _Record:
     beside = {record_key(value.name): value.name for value in protocol.frame_values}
     known = {
         "message",
         "fields",
-        "refused",
-        "request_seen",
+        *_ASIDE,
         "node",
         "address",
         record_key(protocol.address_name or ""),
@@ -143,7 +146,7 @@ def _record(protocol: Protocol, given: Mapping[str, Json]) -> _Record:
     message, fields = given.get("message"), given.get("fields")
     if not (isinstance(message, str) and isinstance(fields, Mapping) and set(given) <= known):
         return _Record(given)
-    others = ("message", "fields", "refused", "request_seen", *beside)
+    others = ("message", "fields", *_ASIDE, *beside)
     addresses = [given[name] for name in given if name not in others]
     fields = {**{beside[key]: value for key, value in given.items() if key in beside}, **fields}
     return _Record(fields, message, _one(tuple(map(str, addresses))) if addresses else None)

@@ -199,24 +199,16 @@ class EitherWay:
         return events
 
 
-class Told:
-    """A stream whose answers that only their request tells apart have the message that it asked for."""
+class Telling:
+    """Gives answers that only their request tells apart the message that it asked for."""
 
-    def __init__(self, stream: Stream, codec: ModuleType, request: MessageObject | None = None) -> None:
-        """``request`` is the first one, if it is not in the stream."""
-        self._stream = stream
+    def __init__(self, codec: ModuleType, request: MessageObject | None = None) -> None:
+        """``request`` is the first one, if it is not among the events."""
         self._codec = codec
         self._request = request
 
-    def feed(self, data: bytes) -> Iterator[Event]:
-        """Take bytes."""
-        return map(self._told, self._stream.feed(data))
-
-    def finish(self) -> Iterator[Event]:
-        """The end of the stream."""
-        return map(self._told, self._stream.finish())
-
-    def _told(self, event: Event) -> Event:
+    def told(self, event: Event) -> Event:
+        """Return an event, or the message that it has by the request before it."""
         if isinstance(event, Bad):
             return event
         if any(type(event) is command.request for command in self._codec.COMMANDS.values()):
@@ -233,6 +225,22 @@ class Told:
         """Whether the node that a request asks sends an answer."""
         asked = address_of(request)
         return asked in (address_of(event), self._codec.BUS.broadcast)
+
+
+class Told:
+    """A stream whose answers that only their request tells apart have the message that it asked for."""
+
+    def __init__(self, stream: Stream, telling: Telling) -> None:
+        """Take the events of a stream."""
+        self._stream, self._telling = stream, telling
+
+    def feed(self, data: bytes) -> Iterator[Event]:
+        """Take bytes."""
+        return map(self._telling.told, self._stream.feed(data))
+
+    def finish(self) -> Iterator[Event]:
+        """The end of the stream."""
+        return map(self._telling.told, self._stream.finish())
 
 
 def _bad(fault: Fault, base: int = 0) -> Bad:
@@ -258,11 +266,12 @@ def open_stream(
     protocol: Described, codec: ModuleType, direction: Direction | None, request: MessageObject | None = None
 ) -> Stream:
     """Return a stream for a protocol with frames; ``request`` is what the first answers answer."""
-    stream = _opened(protocol, codec, direction)
-    return stream if protocol.carrier is None else Told(stream, codec, request)
+    stream = open_untold(protocol, codec, direction)
+    return stream if protocol.carrier is None else Told(stream, Telling(codec, request))
 
 
-def _opened(protocol: Described, codec: ModuleType, direction: Direction | None) -> Stream:
+def open_untold(protocol: Described, codec: ModuleType, direction: Direction | None) -> Stream:
+    """Return a stream whose answers have the message that their bytes alone tell."""
     if protocol.directions == ("message",):
         return OneWay(codec, "message")
     if direction:

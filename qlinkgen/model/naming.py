@@ -185,7 +185,7 @@ def file_stem(protocol: str) -> str:
 #: Other keys of JSON lines, vectors and construct containers.
 _IN_RECORDS = frozenset(
     """message fields raw kinds request payload wire source decode_only what kind part error at from to
-    sent_on repeat delay late stray unanswered asked offset time refused work""".split()  # noqa: SIM905
+    sent_on repeat delay late stray unanswered asked offset time file refused work""".split()  # noqa: SIM905
 )
 
 

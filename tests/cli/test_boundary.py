@@ -102,7 +102,8 @@ def test_interrupted() -> None:
         process.stdin.write(b"a5a504210315e8\n")
         process.stdin.flush()
         assert (
-            process.stdout.readline() == b'{"message": "motor_position.request", "node": 3, "fields": {}}\n'
+            process.stdout.readline()
+            == b'{"message": "motor_position.request", "node": 3, "fields": {}, "offset": 0}\n'
         )
         time.sleep(0.05)
         process.send_signal(signal.SIGINT)

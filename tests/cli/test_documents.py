@@ -29,6 +29,7 @@ DOCUMENTS = [
     "README.md",
     "docs/tutorial.md",
     "docs/cli.md",
+    "docs/captures.md",
     "docs/library.md",
     "docs/import.md",
     "docs/plan.md",

@@ -107,3 +107,5 @@ def test_line_numbers_of_standard_input(qlinkgen: Run) -> None:
     for text, line in (("a5\n# g\na5a\n", 3), ("a5\n\n0xg", 3), ("a5 a", None), ("# a\na5 a5a # b", 2)):
         result = qlinkgen("decode", "qlink", "-", stdin=text.encode())
         assert (f"standard input, line {line}:" in result.err) is (line is not None)
+        if line is None:
+            assert "no frame in 2 bytes" in result.err

@@ -48,6 +48,7 @@ def test_records_have_the_values_of_their_direction(axis: ModuleType, qlinkgen: 
     record = qlinkgen("decode", FILE, "--direction", "request", REQUEST)
     assert json.loads(record.out) == {
         "message": "rotate.request", "node": 5, "kind_": 3, "number": 0, "fields": {"speed": 500},
+        "offset": 0,
     }  # fmt: skip
 
 

@@ -32,7 +32,7 @@ def test_decode_prints_them(qlinkgen: Run) -> None:
     done = qlinkgen("decode", "stm32", "--message", "get.known", "02 31 00 01")
     assert done.code == 0, done.err
     record: Any = json.loads(done.out)
-    assert record == {"message": "get.known", "fields": {"version": 0x31, "codes": [0, 1]}}
+    assert record == {"message": "get.known", "fields": {"version": 0x31, "codes": [0, 1]}, "offset": 0}
     wrong = qlinkgen("decode", "stm32", "--message", "get.known", "03 31 00 01")
     assert wrong.code == 1
     assert json.loads(wrong.out)["error"]["kind"] == "length"
