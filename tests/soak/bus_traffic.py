@@ -308,7 +308,8 @@ class Traffic:
     def _find(self, *numbers: int) -> int:
         for _ in range(200):
             for found in self.bus.scan(numbers):
-                return found.node
+                if not found.garbled:  # noise at a number that no node has
+                    return found.node
         raise Mismatch(f"no node answers as {numbers} any more")
 
     def _motor(self, number: int, held: Held) -> None:
