@@ -21,6 +21,7 @@ from qlinkgen.cli.wire_options import attempts_option, baud_option, parse_nodes,
 from qlinkgen.link.codec import Codec, Command
 from qlinkgen.link.timing import Timing
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.codec import Codec as Frames
 
@@ -93,7 +94,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     slack: float,
     attempts: int,
     as_json: bool,
-    crc: str | None,
+    crc: Replacement | None,
 ) -> int:
     """Compute how long a cycle of periodic requests takes, and how much of the line it uses.
 

@@ -17,6 +17,7 @@ from qlinkgen.errors import SchemaError
 from qlinkgen.model.checksum import candidates
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.model.spelling import similar
 from qlinkgen.model.texts import visible
 
@@ -33,7 +34,7 @@ def find_schema(name: str) -> Path:
         raise Failure(f"unknown schema '{name}'; {error.faults[0].hint}") from None
 
 
-def load_protocol(name: str, crc: str | None = None, version: str | None = None) -> Protocol:
+def load_protocol(name: str, crc: Replacement | None = None, version: str | None = None) -> Protocol:
     """Load a protocol by shipped name or path. Raises SchemaError."""
     from qlinkgen.cli.model_cache import keep, recall  # noqa: PLC0415  # JSON is not needed by all commands
 
@@ -49,18 +50,16 @@ def load_protocol(name: str, crc: str | None = None, version: str | None = None)
     from qlinkgen.plan.framing import frame_plan  # noqa: PLC0415  # only this option needs the plan
 
     if not any(each.check for each in frame_plan(protocol.frame).every):
-        raise Failure(f"--set crc={crc}: the frame of {protocol.name} has no checksum; omit the option")
+        raise Failure(f"{crc}: the frame of {protocol.name} has no checksum; omit the option")
     try:
-        protocol = load(path, crc=crc, version=version)
-        if names := [each.name for each in candidates(crc)]:
-            warn(f"--set crc={crc}: several algorithms have this name; write one of {', '.join(names)}")
+        protocol = load(path, crc=crc.algorithm, crc_over=crc.over, version=version)
+        if names := [each.name for each in candidates(crc.algorithm or "")]:
+            warn(f"{crc}: several algorithms have this name; write one of {', '.join(names)}")
         return protocol
     except SchemaError as error:
         # The schema is valid without the option.
         fault = error.faults[0]
-        raise Failure(
-            f"--set crc={crc}: {fault.message}" + (f"; {fault.hint}" if fault.hint else "")
-        ) from None
+        raise Failure(f"{crc}: {fault.message}" + (f"; {fault.hint}" if fault.hint else "")) from None
 
 
 def find_message(protocol: Protocol, name: str) -> Message:
@@ -137,22 +136,34 @@ def addressed(protocol: Protocol, message: Message) -> bool:
     return protocol.address_name is not None and bool(message.addresses)
 
 
-def _crc(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:  # noqa: ARG001
-    if value is None:
-        return None
-    key, _, crc = value.partition("=")
-    if key != "crc" or not crc:
-        raise Failure(f"--set {value}: only crc=NAME can be set, for example --set crc=crc-16/xmodem")
-    return crc
+def _set(
+    context: click.Context,  # noqa: ARG001  # as all callbacks
+    parameter: click.Parameter,  # noqa: ARG001
+    values: tuple[str, ...],
+) -> Replacement | None:
+    given: dict[str, str] = {}
+    for value in values:
+        key, _, set_to = value.partition("=")
+        if key not in {"crc", "crc_over"} or not set_to.strip(","):
+            raise Failure(
+                f"--set {value}: only crc=NAME and crc_over=PART,PART can be set, for example "
+                "--set crc=crc-16/xmodem"
+            )
+        if key in given:
+            raise Failure(f"--set {value}: {key} is set twice; omit one of them")
+        given[key] = set_to
+    over = [part.strip() for part in given.get("crc_over", "").split(",")]
+    return Replacement(given.get("crc"), tuple(filter(None, over))) if given else None
 
 
-#: ``--set crc=NAME``; the command gets the algorithm's name as ``crc``.
+#: ``--set crc=NAME`` and ``--set crc_over=PART,PART``; the command gets them as ``crc``.
 crc_option = click.option(
     "--set",
     "crc",
+    multiple=True,
     metavar="crc=NAME",
-    callback=_crc,
-    help="Use another checksum algorithm from the catalogue.",
+    callback=_set,
+    help="Use another checksum algorithm from the catalogue; crc_over=PART,PART sets what it covers.",
 )
 
 

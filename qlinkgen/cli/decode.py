@@ -32,6 +32,7 @@ from qlinkgen.link.codec import Fault, Message
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import address_attribute, attribute, record_key
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.model.transaction import Means, Reply
 from qlinkgen.model.values import Json, to_json
 
@@ -58,7 +59,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     name: str | None,
     strict: bool,
     capture: CaptureOptions,
-    crc: str | None,
+    crc: Replacement | None,
     version: str | None,
 ) -> int:
     """Print every frame of captures as a JSON object; bytes between frames are skipped.

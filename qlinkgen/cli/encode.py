@@ -26,6 +26,7 @@ from qlinkgen.link.codec import prove
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.model.values import Json, whole_number
 from qlinkgen.plan.framing import frame_plan
 
@@ -61,7 +62,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     addresses: tuple[str, ...],
     object_: str | None,
     request: str | None,
-    crc: str | None,
+    crc: Replacement | None,
     version: str | None,
 ) -> None:
     """Print the wire bytes of a message as lower-case hex, with length, checksum and stuffing.

@@ -23,6 +23,7 @@ from qlinkgen.cli.span_text import value_of
 from qlinkgen.cli.streams import PROGRESS
 from qlinkgen.cli.tables import Table, heading, paragraph
 from qlinkgen.model.message import Direction
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.model.texts import one_line
 from qlinkgen.plan import Plan, plan_of
 from qlinkgen.plan.dissect import dissect, request_size
@@ -55,7 +56,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     direction: Direction | None,
     request: str | None,
     name: str | None,
-    crc: str | None,
+    crc: Replacement | None,
     version: str | None,
 ) -> int:
     """Describe every byte of one frame; for each error, the rule broken and the likely cause.

@@ -22,6 +22,7 @@ from qlinkgen.cli.tables import Table
 from qlinkgen.cli.wire_options import counted
 from qlinkgen.link.codec import Framed, is_message
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.model.transaction import Command
 from qlinkgen.model.values import Json, whole_number
 from qlinkgen.plan import plan_of
@@ -57,7 +58,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     seed: int,
     chosen: tuple[int, ...],
     as_json: bool,
-    crc: str | None,
+    crc: Replacement | None,
     asking: Asking,
 ) -> int:
     """Send valid, wrong and damaged frames to a device, and report what it does wrong.

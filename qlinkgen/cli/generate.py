@@ -30,6 +30,7 @@ from qlinkgen.cli.package import package_option
 from qlinkgen.cli.targets import DEFAULT, TARGETS, reference_outputs
 from qlinkgen.errors import Fault, SchemaError
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.replacement import Replacement
 
 Role = Literal["both", "master", "slave"]
 
@@ -68,7 +69,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     targets: tuple[str, ...],
     output: str,
     check: bool,
-    crc: str | None,
+    crc: Replacement | None,
     version: str | None,
     role: Role,
     only: tuple[str, ...],
@@ -119,7 +120,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     return FINE
 
 
-def _load(schemas: Sequence[str], crc: str | None, version: str | None) -> dict[str, Protocol]:
+def _load(schemas: Sequence[str], crc: Replacement | None, version: str | None) -> dict[str, Protocol]:
     """Load every protocol, by its schema as given; the faults of all files are reported together."""
     protocols: dict[str, Protocol] = {}
     faults: list[Fault] = []

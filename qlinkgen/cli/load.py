@@ -26,6 +26,7 @@ from qlinkgen.cli.wire_options import (
 from qlinkgen.codecs import qlink
 from qlinkgen.errors import HexFileError, PortLost
 from qlinkgen.link.echo import EchoMode
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.protocols.qlink import Bus, LoadProgress
 from qlinkgen.protocols.qlink.facts import BAUD
 from qlinkgen.protocols.qlink.hexfile import read_hex
@@ -64,7 +65,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     attempts: int,
     slack: float | None,
     echo: EchoMode | None,
-    crc: str | None,
+    crc: Replacement | None,
 ) -> None:
     """Load an Intel HEX file into a node of a Q.link bus.
 
@@ -81,8 +82,9 @@ def command(  # noqa: PLR0917  # click passes them by name
         raise Failure(f"{protocol} has no procedure that loads a program; qlink has one")
     text = _text(file)
     with_crc(qlink, qlink.Codec, crc)
+    algorithm = crc.algorithm if crc else None
     with open_line(port, baud or BAUD) as opened:
-        bus = Bus(opened, attempts=attempts, echo=echo or "auto", health=None, slack=slack, crc=crc)
+        bus = Bus(opened, attempts=attempts, echo=echo or "auto", health=None, slack=slack, crc=algorithm)
         with _told(node, len(text)) as show:
             report = bus.load(node, text, patience=patience, progress=show)
     pieces, repeats = counted(report.pieces, "piece"), counted(report.repeats, "repeat")

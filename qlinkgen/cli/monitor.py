@@ -26,6 +26,7 @@ from qlinkgen.cli.wire_options import (
     slack_option,
     stop_bits_option,
 )
+from qlinkgen.model.replacement import Replacement
 
 BELONGS: Belongs = {"slack": (BUS,)}
 
@@ -55,7 +56,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     slack: float | None,
     parity: Parity,
     stop_bits: str,
-    crc: str | None,
+    crc: Replacement | None,
 ) -> None:
     """Listen to a bus and print requests and responses, until Ctrl-C. Nothing is sent.
 

@@ -25,6 +25,7 @@ from qlinkgen.cli.wire_options import (
     stop_bits_option,
 )
 from qlinkgen.link.ring_events import RingEvent
+from qlinkgen.model.replacement import Replacement
 
 
 @click.command("ring")
@@ -48,7 +49,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     baud: int | None,
     parity: Parity,
     stop_bits: str,
-    crc: str | None,
+    crc: Replacement | None,
 ) -> None:
     """Join a ring as a passive node: forward and print every message, until Ctrl-C.
 

@@ -32,6 +32,7 @@ from qlinkgen.link.events import Event, Sent
 from qlinkgen.link.survey import Present, survey
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.model.transaction import Command
 from qlinkgen.model.values import Json
 
@@ -58,7 +59,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     assignments: tuple[str, ...],
     nodes: str | None,
     as_json: bool,
-    crc: str | None,
+    crc: Replacement | None,
     asking: Asking,
 ) -> int:
     """Ask every node of a bus with one request, and print those that answer.

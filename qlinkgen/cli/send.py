@@ -32,6 +32,7 @@ from qlinkgen.cli.wire_options import (
     slack_option,
     stop_bits_option,
 )
+from qlinkgen.model.replacement import Replacement
 
 BELONGS: Belongs = {
     "attempts": (BUS, HOST),
@@ -122,7 +123,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     every: float | None,
     traced: bool,
     record: str | None,
-    crc: str | None,
+    crc: Replacement | None,
 ) -> int:
     """Send a request on PORT and print the response like decode: one JSON object.
 

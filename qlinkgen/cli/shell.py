@@ -16,6 +16,7 @@ from qlinkgen.cli.kinds import BUS, kind_of
 from qlinkgen.cli.shell_lines import Lines, Reader, perform_all
 from qlinkgen.cli.wire_options import attempts_option
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.model.values import whole_number
 
 
@@ -33,7 +34,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     port: str,
     node: str | None,
     attempts: int,
-    crc: str | None,
+    crc: Replacement | None,
     asking: Asking,
 ) -> int:
     """Send requests to a bus line by line, and print the responses with their units.

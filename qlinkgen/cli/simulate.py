@@ -11,6 +11,7 @@ from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, ki
 from qlinkgen.cli.simulating import plan_of
 from qlinkgen.cli.tracing import record_option, trace_option
 from qlinkgen.cli.wire_options import seconds
+from qlinkgen.model.replacement import Replacement
 
 BELONGS: Belongs = {
     **dict.fromkeys(("nodes", "echo", "value", "file", "memory", "delay", "refuse", "tap", "traced"), (BUS,)),
@@ -111,7 +112,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     seed: int | None,
     baud: int | None,
     echo: bool,
-    crc: str | None,
+    crc: Replacement | None,
 ) -> None:
     """Simulate nodes on a new port (a pty, or TCP) until Ctrl-C or SIGTERM.
 
@@ -189,7 +190,7 @@ def command(  # noqa: PLR0917  # click passes them by name
         )
 
 
-def _kind(name: str, crc: str | None) -> Kind:
+def _kind(name: str, crc: Replacement | None) -> Kind:
     """Return the kind of a protocol; refuse kinds that cannot be simulated, and options of other kinds."""
     shipped = shipped_kind(name)
     if shipped is not None:

@@ -15,6 +15,7 @@ from qlinkgen.cli.wire_options import ANY_SPEED, counted, parse_nodes, with_crc
 from qlinkgen.link.codec import Codec, Framed
 from qlinkgen.link.many import has_endless
 from qlinkgen.link.slave import Node, SlaveEngine
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.plan import plan_of
 from qlinkgen.protocols.qlink.facts import NODES
 from qlinkgen.sim import FaultPlan, Wire
@@ -32,7 +33,7 @@ def simulate_bus(
     baud: int | None,
     plan: FaultPlan | None,
     echo: bool,
-    crc: str | None,
+    crc: Replacement | None,
     behaviour: Behaviour,
     tap: str | None = None,
     traced: bool = False,
@@ -73,7 +74,7 @@ def simulate_bus(
 
 
 def _nodes(
-    name: str, nodes: str | None, crc: str | None, behaviour: Behaviour
+    name: str, nodes: str | None, crc: Replacement | None, behaviour: Behaviour
 ) -> tuple[Codec, list[Node], Mapping[type[Framed], float]]:
     if is_shipped(name, "qlink"):
         from qlinkgen.codecs import qlink  # noqa: PLC0415  # only for Q.link

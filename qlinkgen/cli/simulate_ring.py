@@ -16,6 +16,7 @@ from qlinkgen.cli.ring_programs import programs_of, run_closed, run_open, script
 from qlinkgen.cli.simulating import port_of, ring_tap, run_bus, say
 from qlinkgen.cli.wire_options import counted, with_crc
 from qlinkgen.link.ring import RingCodec, RingNode
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.protocols.trio.basic import ProgrammedNode
 from qlinkgen.protocols.trio.client import Node, engine_of
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
@@ -37,7 +38,7 @@ def simulate_ring(
     listen: str | None = None,
     baud: int | None,
     plan: FaultPlan | None,
-    crc: str | None,
+    crc: Replacement | None,
     programs: Sequence[str] = (),
     keys: Sequence[str] = (),
     closed: bool = False,

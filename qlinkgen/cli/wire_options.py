@@ -13,6 +13,7 @@ from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.link.echo import PROBE, EchoMode
 from qlinkgen.link.transaction import Accepts
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.model.values import whole_number
 from qlinkgen.plan.framing import frame_plan
 from qlinkgen.transport.opening import open_port
@@ -155,12 +156,21 @@ def matching(name: str) -> Mapping[str, Accepts] | None:
     return ACCEPTS
 
 
-def with_crc(plain: A, choose: Callable[[str], B], crc: str | None) -> A | B:
-    """Return a shipped codec, with another CRC if one is given."""
+def with_crc(plain: A, choose: Callable[[str], B], crc: Replacement | None) -> A | B:
+    """Return a shipped codec, with another CRC if one is given.
+
+    Raises:
+        Failure: the algorithm does not fit, or the coverage is given, which a codec cannot change.
+    """
+    if crc is not None and crc.over:
+        raise Failure(
+            f"{crc}: this uses the module of the package, whose checksum covers what its schema says; omit "
+            "crc_over, or give the path of a copy of the schema with another `over`"
+        )
     try:
-        return plain if crc is None else choose(crc)
+        return plain if crc is None or crc.algorithm is None else choose(crc.algorithm)
     except ValueError as error:
-        raise Failure(f"--set crc={crc}: {error}") from None
+        raise Failure(f"{crc}: {error}") from None
 
 
 def parse_nodes(text: str, first: int, last: int, where: str = "--nodes") -> list[int]:

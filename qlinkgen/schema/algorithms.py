@@ -12,10 +12,8 @@ from qlinkgen.schema.source import Path
 class AlgorithmBuilder:
     """Finds the algorithms of check values."""
 
-    def __init__(self, report: Reporter, *, replaced: bool = False) -> None:
-        """``replaced``: the algorithm is not that of the file."""
+    def __init__(self, report: Reporter) -> None:
         self._report = report
-        self._replaced = replaced
 
     def build(self, stated: AnyAlgorithm, init: int | None, path: Path) -> catalogue.Checksum | None:
         """The algorithm of a part or field; None if it is unknown. ``init`` replaces its start."""
@@ -43,7 +41,7 @@ class AlgorithmBuilder:
             names = listed((f"{each.name} ({each.check:0{each.width // 4}X})" for each in candidates), "or")
             hint = f"write the one whose check value for 123456789 matches the document: {names}"
             rule = "ambiguous-algorithm" if found else "unknown-algorithm"
-            self._report.error(rule, (*path, "algorithm"), what, hint, of_key=self._replaced)
+            self._report.error(rule, (*path, "algorithm"), what, hint)
         return bool(candidates)
 
     def _named(self, name: str, path: Path) -> catalogue.Checksum | None:
@@ -58,7 +56,7 @@ class AlgorithmBuilder:
             if error.suggestions:
                 hint = f"did you mean {listed(map(repr, error.suggestions), 'or')}?"
             what = f"unknown checksum algorithm {shown(name)}"
-            self._report.error("unknown-algorithm", (*path, "algorithm"), what, hint, of_key=self._replaced)
+            self._report.error("unknown-algorithm", (*path, "algorithm"), what, hint)
             return None
 
     def _parameters(self, spec: CrcSpec, path: Path) -> catalogue.Algorithm | None:

@@ -60,35 +60,14 @@ def with_payload(specs: Mapping[str, PartSpec]) -> Mapping[str, PartSpec]:
     return {**{each: specs[each] for each in names[:at]}, name: payload, **{e: specs[e] for e in names[at:]}}
 
 
-def _depends(spec: PartSpec) -> bool:
-    """Whether only some frames of a direction have a part."""
-    return any(test.field != "direction" for test in spec.when or ())
-
-
-def _main_check(specs: Mapping[str, PartSpec]) -> str:
-    """The check value whose algorithm can be replaced: the last over the payload, else the last."""
-    checks = [
-        name
-        for name, spec in specs.items()
-        if spec.told == "checksum" and not spec.every and not _depends(spec)
-    ]
-    payload = next((name for name, spec in specs.items() if spec.told == "payload"), "")
-    over = [name for name in checks if payload in (specs[name].over or ())]
-    return (over or checks or [""])[-1]
-
-
 class FrameBuilder:
     """Builds the frame of one file."""
 
-    def __init__(
-        self, file: SchemaFile, report: Reporter, types: TypeBuilder, crc: str | None = None
-    ) -> None:
-        """``types`` are those of values; ``crc`` replaces the algorithm in the file."""
+    def __init__(self, file: SchemaFile, report: Reporter, types: TypeBuilder) -> None:
+        """``types`` are those of values."""
         self._file = file
         self._report = report
-        self._parts = PartBuilder(file, report, types, crc)
-        #: Builds check values whose algorithm ``crc`` does not replace.
-        self._others = PartBuilder(file, report, types, None)
+        self._parts = PartBuilder(file, report, types)
 
     def build(self) -> Frame | None:
         """The frame; None after an error that prevents building it."""
@@ -157,12 +136,8 @@ class FrameBuilder:
         given = specs
         specs, opening = without_text_id(specs, path, self._report)
         specs = {name: part for name, part in specs.items() if name not in silences}
-        main = _main_check(specs)
         parts = placed(
-            tuple(
-                (self._parts if name == main else self._others).build(name, part, specs, (*path, name))
-                for name, part in specs.items()
-            )
+            tuple(self._parts.build(name, part, specs, (*path, name)) for name, part in specs.items())
         )
         if opening:
             self._parts.check_opening(given[opening], (*path, opening))

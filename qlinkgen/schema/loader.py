@@ -10,6 +10,7 @@ from pathlib import Path as FilePath
 from qlinkgen.errors import Fault, SchemaError
 from qlinkgen.model.frame import Frame, FrameKinds
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.schema.addresses import check_addresses
 from qlinkgen.schema.asked import check_told
 from qlinkgen.schema.commands import CommandBuilder, build_bus
@@ -26,6 +27,7 @@ from qlinkgen.schema.notation import Version
 from qlinkgen.schema.notation import version as as_version
 from qlinkgen.schema.part_types import place_part_types
 from qlinkgen.schema.reading import read_regular, reason_of
+from qlinkgen.schema.replaced import with_check
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.response_forms import with_forms
 from qlinkgen.schema.seeds import check_references, check_types
@@ -40,6 +42,8 @@ from qlinkgen.schema.unconfirmed import report_unconfirmed
 from qlinkgen.schema.unknown import UnknownBuilder
 from qlinkgen.schema.versions import FIRST, boundaries, check_lifetimes, in_version
 
+_AS_WRITTEN = Replacement()
+
 
 def lint(path: FilePath | str, *, version: str | None = None) -> list[Fault]:
     """All errors and warnings of a schema file, in order of the text.
@@ -48,10 +52,10 @@ def lint(path: FilePath | str, *, version: str | None = None) -> list[Fault]:
         path: The file.
         version: Version of the protocol; by default the newest one, and the errors of each other one.
     """
-    faults = _load(FilePath(path), None, version)[1]
+    faults = _load(FilePath(path), _AS_WRITTEN, version)[1]
     if version is None:
         for other in _versions(FilePath(path), faults):
-            found = _load(FilePath(path), None, str(other))[1]
+            found = _load(FilePath(path), _AS_WRITTEN, str(other))[1]
             known = {(fault.rule, fault.line, fault.column) for fault in faults}
             faults += [
                 replace(fault, message=f"{fault.message} in version {other} of the protocol")
@@ -76,18 +80,21 @@ def _versions(path: FilePath, faults: Sequence[Fault]) -> tuple[Version, ...]:
     return boundaries(file) if file else ()
 
 
-def load(path: FilePath | str, *, crc: str | None = None, version: str | None = None) -> Protocol:
+def load(
+    path: FilePath | str, *, crc: str | None = None, crc_over: Sequence[str] = (), version: str | None = None
+) -> Protocol:
     """Read a schema file.
 
     Args:
         path: The file.
         crc: Algorithm that replaces the one in the file.
+        crc_over: Parts that its check value covers, in place of those in the file.
         version: Version of the protocol; by default the newest one.
 
     Raises:
         SchemaError: with all errors of the file.
     """
-    protocol, faults = _load(FilePath(path), crc, version)
+    protocol, faults = _load(FilePath(path), Replacement(crc, tuple(crc_over)), version)
     errors = [fault for fault in faults if fault.severity == "error"]
     if protocol is None or errors:
         raise SchemaError(errors)
@@ -95,9 +102,20 @@ def load(path: FilePath | str, *, crc: str | None = None, version: str | None = 
 
 
 def loads(
-    text: str, file: str, *, crc: str | None = None, version: str | None = None
+    text: str,
+    file: str,
+    *,
+    crc: str | None = None,
+    crc_over: Sequence[str] = (),
+    version: str | None = None,
 ) -> tuple[Protocol | None, list[Fault]]:
-    """The protocol described by a text (None if it has errors), and its faults."""
+    """The protocol described by a text (None if it has errors), and its faults; see `load`."""
+    return _loads(text, file, Replacement(crc, tuple(crc_over)), version)
+
+
+def _loads(
+    text: str, file: str, check: Replacement, version: str | None
+) -> tuple[Protocol | None, list[Fault]]:
     source = parse(text)
     report = Reporter(file, source)
     for fault in source.faults:
@@ -107,21 +125,21 @@ def loads(
     texts = (text, *include(source, report))
     place_part_types(source, report)
     chosen = None if version is None else as_version(version)
-    protocol = _build(source.data, report, "".join(texts), FilePath(file).name, crc=crc, version=chosen)
+    protocol = _build(source.data, report, "".join(texts), FilePath(file).name, check, version=chosen)
     return protocol if not report.failed else None, report.faults
 
 
-def _load(path: FilePath, crc: str | None, version: str | None) -> tuple[Protocol | None, list[Fault]]:
+def _load(path: FilePath, check: Replacement, version: str | None) -> tuple[Protocol | None, list[Fault]]:
     try:
         text = read_regular(path)
     except (OSError, UnicodeDecodeError) as error:
         what = f"cannot read it: {reason_of(error)}"
         return None, [Fault(str(path), 1, 1, "file-unreadable", what, "check the path")]
-    return loads(text, str(path), crc=crc, version=version)
+    return _loads(text, str(path), check, version)
 
 
 def _build(
-    data: Data, report: Reporter, text: str, file_name: str, *, crc: str | None, version: Version | None
+    data: Data, report: Reporter, text: str, file_name: str, check: Replacement, *, version: Version | None
 ) -> Protocol | None:
     whole = check_structure(data, report)
     if whole is None:
@@ -129,10 +147,12 @@ def _build(
     whole = without_choices(whole, report)
     check_lifetimes(whole, report)
     file = with_shared_proofs(with_forms(in_version(whole, version), report))
+    if check != _AS_WRITTEN:
+        file = with_check(file, check, report)
     text += f"\nversion {version}" if version else ""
     payload_max = payload_bounds(file)[1]
     types = TypeBuilder(file, report, payload_max)
-    frames = FrameBuilder(file, report, types, crc)
+    frames = FrameBuilder(file, report, types)
     frame: Frame | None = build_kinds(file, frames, report) if file.frames else frames.build()
     check_kind_names(file, report)
     bus = build_bus(file, report)
@@ -176,5 +196,5 @@ def _build(
     protocol = replace(protocol, to_unknown=UnknownBuilder(file, report, frame, transactions).build())
     check_told(protocol, messages.id_places, report)
     # With another checksum, or in another version, the bytes of the document are wrong.
-    examples = build_examples(file, protocol, report) if crc is None and version is None else ()
+    examples = build_examples(file, protocol, report) if check == _AS_WRITTEN and version is None else ()
     return replace(protocol, examples=examples)

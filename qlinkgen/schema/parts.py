@@ -107,11 +107,10 @@ _KEYS = (
 class PartBuilder:
     """Builds the parts of one frame."""
 
-    def __init__(self, file: SchemaFile, report: Reporter, types: TypeBuilder, crc: str | None) -> None:
-        """``types`` are those of values; ``crc`` replaces the algorithm in the file."""
+    def __init__(self, file: SchemaFile, report: Reporter, types: TypeBuilder) -> None:
+        """``types`` are those of values."""
         self._file = file
         self._report = report
-        self._crc = crc
         self._pieces = PieceBuilder(report, types)
 
     def roles_fit(self, specs: Mapping[str, PartSpec], needed: Sequence[str], path: Path) -> bool:
@@ -427,12 +426,10 @@ class PartBuilder:
         return spec.otherwise
 
     def _algorithm(self, spec: PartSpec, path: Path) -> catalogue.Checksum | None:
-        name = self._crc or spec.algorithm
-        if name is None:
+        if spec.algorithm is None:
             self._lacks("algorithm", "add algorithm: crc-16/ibm-3740 or another", path)
             return None
-        builder = AlgorithmBuilder(self._report, replaced=self._crc is not None)
-        return builder.build(name, spec.init if self._crc is None else None, path)
+        return AlgorithmBuilder(self._report).build(spec.algorithm, spec.init, path)
 
     def _sent(self, spec: PartSpec, scalar: Scalar, path: Path) -> tuple[Chunk, ...]:
         if spec.as_ is not None:

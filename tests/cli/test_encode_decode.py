@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import load_protocol
 from qlinkgen.cli.streams import EitherWay, open_stream
+from qlinkgen.model.checksum import find
 from qlinkgen.schema import loads
 from tests.cli.conftest import Run
 from tests.cli.test_boundary import COMMAND, ENVIRONMENT
@@ -426,6 +427,27 @@ def test_another_crc(qlinkgen: Run, protocol: str) -> None:
     assert qlinkgen("decode", "qlink", result.out.strip()).code == 1
     assert qlinkgen("decode", "qlink", result.out.strip(), "--set", "crc=xmodem").code == 0
     assert qlinkgen("explain", "qlink", result.out.strip(), "--set", "crc=xmodem").code == 0
+
+
+def test_another_coverage(qlinkgen: Run) -> None:
+    """Section 6.2 of Q.link leaves the length out of the CRC."""
+    over = ("--set", "crc_over=command,node,data")
+    request = ("motor_position", "--node", "3")
+    result = qlinkgen("encode", "qlink", *request, *over)
+    covered = bytes.fromhex(result.out)[3:-2]
+    assert covered == b"\x21\x03"
+    assert int(result.out.strip()[-4:], 16) == find("crc-16/ibm-3740").compute(covered)
+    for command in ("decode", "explain"):
+        assert qlinkgen(command, "qlink", result.out.strip(), *over).code == 0
+        assert qlinkgen(command, "qlink", result.out.strip()).code == 1
+    both = qlinkgen("encode", "qlink", *request, *over, "--set", "crc=xmodem")
+    assert int(both.out.strip()[-4:], 16) == find("crc-16/xmodem").compute(covered)
+    refused = qlinkgen("simulate", "qlink", *over)
+    assert refused.code == 2
+    assert "--set crc_over=command,node,data: this uses the module of the package" in refused.err
+    packet = qlinkgen("encode", "mc1231a", "update", "--set", "crc_over=command")
+    assert packet.code == 2
+    assert "the check value of a packet covers all of it; omit the option" in packet.err
 
 
 @pytest.mark.slow

@@ -205,10 +205,11 @@ def test_list_outputs_writes_nothing(qlinkgen: Run, out: Path) -> None:
     assert not out.exists()
 
 
-def test_another_crc(qlinkgen: Run, out: Path) -> None:
+@pytest.mark.parametrize("other", ["crc=xmodem", "crc_over=command,node,data"])
+def test_another_check_value(qlinkgen: Run, out: Path, other: str) -> None:
     qlinkgen("generate", "qlink", "--target", "vectors", "-o", out)
     before = (out / "vectors/qlink.json").read_text()
-    assert qlinkgen("generate", "qlink", "--target", "vectors", "-o", out, "--set", "crc=xmodem").code == 0
+    assert qlinkgen("generate", "qlink", "--target", "vectors", "-o", out, "--set", other).code == 0
     assert (out / "vectors/qlink.json").read_text() != before
 
 
@@ -217,8 +218,12 @@ def test_another_crc(qlinkgen: Run, out: Path) -> None:
     [
         (("--set", "crc=crc-16/nonsense"), 2, "--set crc=crc-16/nonsense: unknown checksum algorithm"),
         (("--set", "crc=crc-32/iso-hdlc"), 2, "has 32 bits, crc 16"),
-        (("--set", "speed=9600"), 2, "only crc=NAME"),
+        (("--set", "speed=9600"), 2, "only crc=NAME and crc_over=PART,PART"),
         (("--set", "crc="), 2, "only crc=NAME"),
+        (("--set", "crc_over=,"), 2, "only crc=NAME"),
+        (("--set", "crc=arc", "--set", "crc=xmodem"), 2, "crc is set twice; omit one of them"),
+        (("--set", "crc_over=comand,data"), 2, "unknown part 'comand'; did you mean 'command'?"),
+        (("--set", "crc_over=data,command"), 2, "command precedes data on the wire"),
         (("--target", "java"), 2, "'java' is not one of"),
         (("--only", "moton"), 2, "did you mean motion"),
         (("--only", "nope"), 2, "lists them"),

@@ -11,6 +11,7 @@ import pytest
 
 from qlinkgen.cli import model_cache
 from qlinkgen.cli.common import load_protocol
+from qlinkgen.model.replacement import Replacement
 from qlinkgen.schema import loader
 from tests.cli.conftest import THERMO, Run
 from tests.cli.wire import ENVIRONMENT, call
@@ -64,8 +65,8 @@ def test_what_is_different_is_read(folder: Path, reads: Reads, thermo: Path) -> 
     other = thermo.with_name("other.yaml")
     other.write_text(thermo.read_text())
     assert load_protocol(str(other)).schema_file == "other.yaml"
-    load_protocol("qlink", crc="crc-16/xmodem")
-    load_protocol("qlink", crc="crc-16/xmodem")
+    load_protocol("qlink", Replacement("crc-16/xmodem"))
+    load_protocol("qlink", Replacement("crc-16/xmodem"))
     assert reads() == 7  # each once, but the last two twice: without their option first
     assert len(list(folder.iterdir())) == 3
 
