@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import BinaryIO, NamedTuple, TypeAlias
 
 from qlinkgen.captures.analysers import is_annotation, is_saleae, read_annotations, read_saleae
@@ -14,6 +15,7 @@ from qlinkgen.captures.pcap import is_pcap, read_pcap
 from qlinkgen.captures.pcapng import SECTION
 from qlinkgen.captures.reader import Reader
 from qlinkgen.captures.records import Format, Problems, Record
+from qlinkgen.captures.samples import Frame, is_samples, read_samples
 from qlinkgen.errors import CaptureError
 
 Read: TypeAlias = Callable[[BinaryIO, Problems], Iterator[Record]]
@@ -64,6 +66,7 @@ _KINDS: dict[Format, _Kind] = {
     "pcap": _Kind(read_pcap),
     "saleae": _Kind(read_saleae),
     "sigrok": _Kind(read_annotations, is_annotation),
+    "samples": _Kind(partial(read_samples, frame=Frame())),
     "dump": _Kind(read_dump, is_dump),
     "log": _Kind(read_log, is_entry),
     "hex": _Kind(read_hex, is_hex),
@@ -71,9 +74,9 @@ _KINDS: dict[Format, _Kind] = {
 }
 
 
-def reader_of(name: Format) -> Read:
-    """Return the reader of a format."""
-    return _KINDS[name].read
+def reader_of(name: Format, frame: Frame | None = None) -> Read:
+    """Return the reader of a format; `frame`: the bits of a byte in samples of levels."""
+    return partial(read_samples, frame=frame) if name == "samples" and frame else _KINDS[name].read
 
 
 def possible(head: bytes) -> list[Format]:
@@ -87,6 +90,8 @@ def possible(head: bytes) -> list[Format]:
     if is_pcap(head):
         return ["pcap", "raw"]
     lines = [each for each in head_lines(head) if each.strip() and not each.startswith(_REMARKS)]
+    if is_samples(lines):
+        return ["samples", "raw"]
     if is_saleae(lines):
         return ["saleae", "raw"]
     shares = {name: _share(kind.has, lines) for name, kind in _KINDS.items() if kind.has}

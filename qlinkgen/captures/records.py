@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple, get_args
 
 from qlinkgen.captures.pcapng import Direction
 
-Format = Literal["raw", "hex", "dump", "log", "saleae", "sigrok", "pcap", "pcapng"]
+Format = Literal["raw", "hex", "dump", "log", "saleae", "sigrok", "samples", "pcap", "pcapng"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 
 #: Nanoseconds per second.

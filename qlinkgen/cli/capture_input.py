@@ -19,6 +19,7 @@ from qlinkgen.captures.formats import Read, possible, read_raw, reader_of
 from qlinkgen.captures.logs import LineRegex
 from qlinkgen.captures.packed import opened
 from qlinkgen.captures.records import Problems, Record
+from qlinkgen.captures.samples import Frame
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.capture_options import CaptureOptions
 from qlinkgen.cli.decoder import Decoder
@@ -111,7 +112,9 @@ class Capture:
             if not formats:
                 what = f"only a silence ends a frame of {self._protocol.name}, and raw bytes have no times"
                 raise Failure(f"{what}; give hex text with one frame on each line")
-        return [_Reader(reader_of(each), each == "raw") for each in formats]
+        bus = self._protocol.bus
+        frame = Frame(options.baud or bus.baud, bus.bits_per_byte)
+        return [_Reader(reader_of(each, frame), each == "raw") for each in formats]
 
 
 def _choose(

@@ -239,7 +239,7 @@ def test_what_decode_prints_can_be_encoded(qlinkgen: Run, tmp_path: Path) -> Non
 
 def test_silent_formats_are_listed() -> None:
     assert {kind for kind, _ in SILENT.values()} | {kind for kind, _ in STATED.values()} == {
-        "raw", "hex", "log", "saleae", "sigrok", "pcap", "pcapng"
+        "raw", "hex", "log", "saleae", "sigrok", "samples", "pcap", "pcapng"
     }  # fmt: skip
 
 
