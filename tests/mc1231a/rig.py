@@ -209,7 +209,7 @@ def make_rig(
     setting: Setting, *, illegal: tuple[str, ...] = (), forgets: float = 0.0, **options: Any
 ) -> Iterator[Rig]:
     """A rig; options are those of the host."""
-    engine = ChipEngine(ChipSet(illegal=illegal), forgets=forgets, record=True)
+    engine = ChipEngine(ChipSet(illegal=illegal, geared=(1, 2)), forgets=forgets, record=True)
     wire = chip_wire(engine, baud=BAUD if setting.transport == "virtual" else None)
     options.setdefault("slack", SLACK[setting.transport])
     with contextlib.ExitStack() as stack:

@@ -235,6 +235,29 @@ def test_an_electronic_gear_follows_its_master(bench: Bench) -> None:
     assert bench.axis.actual == -100
 
 
+def test_the_electronic_gear_is_that_of_axis_1_unless_told_otherwise(bench: Bench) -> None:
+    bench.do("set_2")
+    bench.do("set_prfl_gear")
+    bench.do("set_ratio", value=-0.5)
+    bench.do("update")
+    assert bench.do("get_ratio").value == 0
+    bench.move(position=10)  # by its old profile
+    bench.wait(50)
+    assert bench.axis.actual == 10
+    with pytest.raises(ValueError, match="axis 2 has no electronic gear"):
+        bench.chip.turn_master(2, 100)
+
+    other = Bench(geared=(1, 2))
+    for command in ("reset", "set_2", "set_prfl_gear"):
+        other.do(command)
+    other.do("set_ratio", value=-0.5)
+    other.do("update")
+    other.chip.turn_master(2, 100)
+    assert other.axis.actual == -50
+    with pytest.raises(ValueError, match="axis must be 1 or 2, not 3"):
+        ChipSet(geared=(3,))
+
+
 def test_a_stop_at_rest_completes_nothing(bench: Bench) -> None:
     bench.do("stop")
     bench.do("update")

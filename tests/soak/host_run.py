@@ -87,7 +87,7 @@ class Session:
     """A host, a chip set, and the model of the expected state."""
 
     def __init__(self, faults: FaultPlan, *, seed: int = 1, forgets: float = 0.0) -> None:
-        self.chip = ChipSet()
+        self.chip = ChipSet(geared=(1, 2))
         self.engine = ChipEngine(self.chip, forgets=forgets, record=True)
         self.faults = faults
         self.port = Tap(chip_wire(self.engine, faults=faults))

@@ -6,7 +6,7 @@ advances the simulation to that time, sample by sample.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import Final
 
 from qlinkgen.codecs import mc1231a
@@ -34,7 +34,12 @@ class ChipSet:
     """
 
     def __init__(
-        self, *, illegal: Iterable[str] = (), sample_time: float = SAMPLE_TIME, error_sign: int = 1
+        self,
+        *,
+        illegal: Iterable[str] = (),
+        sample_time: float = SAMPLE_TIME,
+        error_sign: int = 1,
+        geared: Collection[int] = (1,),
     ) -> None:
         """Make a chip set.
 
@@ -43,13 +48,17 @@ class ChipSet:
             sample_time: seconds of a sample.
             error_sign: 1 if get_actl_pos_err reports target minus actual position, -1 for the reverse: the
                 sources do not agree.
+            geared: axes with an electronic gear; a manual says that its commands are for axis 1 only. Other
+                axes ignore them.
 
         Raises:
-            ValueError: a command is unknown, `sample_time` not positive, or `error_sign` another number.
+            ValueError: a command or an axis is unknown, `sample_time` not positive, or `error_sign` another
+                number.
         """
         if error_sign not in {1, -1}:
             raise ValueError(f"error_sign must be 1 or -1, not {error_sign}")
         self._error_sign = error_sign
+        self._geared = frozenset(map(check_axis, geared))
         self.illegal = frozenset(illegal)
         if unknown := self.illegal - set(mc1231a.COMMANDS):
             raise ValueError(f"illegal: unknown command {min(unknown)!r}; see `qlinkgen show mc1231a`")
@@ -63,12 +72,15 @@ class ChipSet:
             command.request: (name, self._handler(name), _respond(command.response))
             for name, command in mc1231a.COMMANDS.items()
         }
-        self.axes: dict[int, ChipAxis] = {axis: ChipAxis() for axis in AXES}
+        self._limits = {axis: [False, False] for axis in AXES}
         self._reset()
 
     def _reset(self) -> None:
         """Reset, as after power-on; the levels of the inputs do not change."""
-        self.axes = {axis: ChipAxis(self.axes[axis].limits, error_sign=self._error_sign) for axis in AXES}
+        self.axes = {
+            axis: ChipAxis(limits, error_sign=self._error_sign, geared=axis in self._geared)
+            for axis, limits in self._limits.items()
+        }
         self.current = 1
         self.time = 0
         self.values = {"smpl_time": 0, "lmt_sense": 0}
@@ -229,8 +241,14 @@ class ChipSet:
             state.lost = 0
 
     def turn_master(self, axis: int, counts: int) -> None:
-        """Turn the master encoder of an axis in electronic gear."""
-        self.axes[check_axis(axis)].follow(counts)
+        """Turn the master encoder of an axis in electronic gear.
+
+        Raises:
+            ValueError: the axis has no electronic gear.
+        """
+        if check_axis(axis) not in self._geared:
+            raise ValueError(f"axis {axis} has no electronic gear; see `geared` of ChipSet")
+        self.axes[axis].follow(counts)
         self._look_at_interrupts()
 
     def raise_event(self, axis: int, event: int) -> None:

@@ -34,9 +34,10 @@ class ChipAxis:
         limits: inputs of the limit switches, positive and negative; True if active.
     """
 
-    def __init__(self, limits: list[bool] | None = None, *, error_sign: int = 1) -> None:
+    def __init__(self, limits: list[bool] | None = None, *, error_sign: int = 1, geared: bool = True) -> None:
         self.limits = limits if limits is not None else [False, False]
         self._error_sign = error_sign
+        self._geared = geared
         self.values: dict[str, float] = after_reset()
         self.active: dict[str, float] = {name: self.values[name] for name in BUFFERED}
         self.pending: set[str] = set()
@@ -116,8 +117,11 @@ class ChipAxis:
     # Switching ----------------------------------------------------------------------------------------------
 
     def set_mode(self, mode: int) -> None:
-        """Select a profile. It begins at rest: the transition of a motion was not found in the sources."""
-        if mode != self.trajectory.mode:
+        """Select a profile. It begins at rest: the transition of a motion was not found in the sources.
+
+        An axis without electronic gear keeps its profile instead.
+        """
+        if mode != self.trajectory.mode and (self._geared or mode != GEAR):
             self.trajectory.halt()
             self.trajectory.mode = mode
 
@@ -191,7 +195,9 @@ class ChipAxis:
     # Updates ------------------------------------------------------------------------------------------------
 
     def write(self, name: str, value: float) -> None:
-        """Write a register."""
+        """Write a register; an axis without electronic gear has no gear ratio."""
+        if name == "ratio" and not self._geared:
+            return
         self.values[name] = value
         if name in self.active:
             self.pending.add(name)
