@@ -90,8 +90,12 @@ class VirtualRing:
         Raises:
             SimulationError: an argument is out of range.
         """
-        self.nodes = make_nodes(ring, baud=baud, **options)
-        if all(isinstance(node, KeypadNode) for node in self.nodes):
+        places = ring.split(",") if isinstance(ring, str) else list(ring)
+        self.nodes = make_nodes(places, baud=baud, **options)
+        # A passive node that the caller has made may act as one.
+        if not any(isinstance(node, CoordinatorNode) for node in self.nodes) and not any(
+            isinstance(place, RingNode) for place in places
+        ):
             raise SimulationError("a ring needs a Motion Coordinator, which gives keypads their offset")
         self.wire = RingWire(trio, baud=baud, faults=faults, outside=False)
         for number, node in enumerate(self.nodes):

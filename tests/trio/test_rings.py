@@ -135,6 +135,9 @@ def test_a_ring_has_15_places() -> None:
         VirtualRing([])
     with pytest.raises(SimulationError, match="a ring needs a Motion Coordinator"):
         VirtualRing("keypad,keypad")
+    with pytest.raises(SimulationError, match="a ring needs a Motion Coordinator"):
+        VirtualRing("passive,keypad")
+    VirtualRing([RingNode(trio), "keypad"])  # its engine may send an offset
     with pytest.raises(
         SimulationError, match=r"unknown kind of node 'plotter'; .* coordinator, keypad, passive"
     ):
