@@ -13,7 +13,7 @@ from qlinkgen.cli.ring_console import LOOK, Console
 from qlinkgen.cli.simulating import say_port
 from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.model.values import whole_number
-from qlinkgen.protocols.trio.basic import Program, parse
+from qlinkgen.protocols.trio.basic import Pointed, Program, parse
 from qlinkgen.sim import SimulationError
 from qlinkgen.sim.key_script import KeyScript
 from qlinkgen.sim.virtual_ring import VirtualRing
@@ -25,10 +25,14 @@ if TYPE_CHECKING:
 AFTER_KEYS = 10.0
 
 
-def programs_of(options: Sequence[str], kinds: Sequence[str]) -> Mapping[int, Program]:
+def programs_of(
+    options: Sequence[str], kinds: Sequence[str], pointed: Pointed | None
+) -> Mapping[int, Program]:
     """Return the programs of ``--program N=FILE`` by address. Raises Failure, and BasicError."""
+    if pointed and not options:
+        raise Failure(f"--point-format {pointed}: no program prints; give --program, or omit it")
     return {
-        at: parse(_text_of(option, file), file)
+        at: parse(_text_of(option, file), file, pointed=pointed or "before")
         for at, (option, file) in _placed("--program", options, kinds, "coordinator").items()
     }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
 from qlinkgen.cli.arguments import protocol_argument
@@ -13,9 +15,12 @@ from qlinkgen.cli.tracing import record_option, trace_option
 from qlinkgen.cli.wire_options import seconds
 from qlinkgen.model.replacement import Replacement
 
+if TYPE_CHECKING:
+    from qlinkgen.protocols.trio.basic import Pointed
+
 BELONGS: Belongs = {
     **dict.fromkeys(("nodes", "echo", "value", "file", "memory", "delay", "refuse", "tap", "traced"), (BUS,)),
-    **dict.fromkeys(("ring", "programs", "keys", "closed", "length"), (RING,)),
+    **dict.fromkeys(("ring", "programs", "keys", "closed", "length", "pointed"), (RING,)),
     "crc": (BUS, RING),
 }
 
@@ -59,6 +64,12 @@ BELONGS: Belongs = {
     help="Run a Trio BASIC program on the coordinator with address N.",
 )
 @click.option(
+    "--point-format",
+    "pointed",
+    type=click.Choice(["before", "width"]),
+    help="The 6 of PRINT #10,x[6.1]: the places before the point (default), or the width.",
+)
+@click.option(
     "--keys",
     multiple=True,
     metavar="N=KEYS",
@@ -100,6 +111,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     refuse: tuple[str, ...],
     ring: str | None,
     programs: tuple[str, ...],
+    pointed: Pointed | None,
     keys: tuple[str, ...],
     closed: bool,
     length: float | None,
@@ -160,6 +172,7 @@ def command(  # noqa: PLR0917  # click passes them by name
             plan=plan,
             crc=crc,
             programs=programs,
+            pointed=pointed,
             keys=keys,
             closed=closed,
             seconds=length,

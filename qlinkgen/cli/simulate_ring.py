@@ -17,7 +17,7 @@ from qlinkgen.cli.simulating import port_of, ring_tap, run_bus, say
 from qlinkgen.cli.wire_options import counted, with_crc
 from qlinkgen.link.ring import RingCodec, RingNode
 from qlinkgen.model.replacement import Replacement
-from qlinkgen.protocols.trio.basic import ProgrammedNode
+from qlinkgen.protocols.trio.basic import Pointed, ProgrammedNode
 from qlinkgen.protocols.trio.client import Node, engine_of
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
@@ -40,6 +40,7 @@ def simulate_ring(
     plan: FaultPlan | None,
     crc: Replacement | None,
     programs: Sequence[str] = (),
+    pointed: Pointed | None = None,
     keys: Sequence[str] = (),
     closed: bool = False,
     seconds: float | None = None,
@@ -57,7 +58,7 @@ def simulate_ring(
     codec: RingCodec = with_crc(trio, trio.Codec, crc)
     given = RING if ring is None else ring
     kinds = [kind.strip() for kind in given.split(",")]
-    loaded, scripts = programs_of(programs, kinds), scripts_of(keys, kinds)
+    loaded, scripts = programs_of(programs, kinds, pointed), scripts_of(keys, kinds)
     places = [
         ProgrammedNode(loaded[at], codec=codec, baud=baud) if at in loaded else kind
         for at, kind in enumerate(kinds, 1)

@@ -63,6 +63,15 @@ def test_faults_on_a_closed_ring(qlinkgen: Run) -> None:
     assert "4 damaged, 5 faults (flip 5); seed 1\n" in done.err
 
 
+def test_what_a_format_with_a_point_counts(qlinkgen: Run, tmp_path: Path) -> None:
+    program = tmp_path / "x.bas"
+    program.write_text("SEND(10,2,10)\nPRINT #10,2.5[6.1];")
+    options = ("--ring", "coordinator,keypad", "--closed", "--program", f"1={program}")
+    for given, row in (((), "     2.5"), (("before",), "     2.5"), (("width",), "   2.5")):
+        done = qlinkgen("simulate", "trio", *options, *(("--point-format", *given) if given else ()))
+        assert objects(done.out)[-1]["display"] == [row, "", "", ""]
+
+
 def test_the_time_to_end(qlinkgen: Run, tmp_path: Path) -> None:
     program = tmp_path / "x.bas"
     program.write_text("x: WA(1000): VR(0)=VR(0)+1: GOTO x")
@@ -114,6 +123,7 @@ def test_a_program_that_cannot_be_read(qlinkgen: Run, tmp_path: Path) -> None:
         (("--ring", "keypad", "--keys", "1=5", "--keys", "1=6"), "address 1 has one already"),
         (("--ring", "keypad", "--keys", "1=5 64"), "'64' is neither a key nor a pause; write the number"),
         (("--ring", "keypad", "--closed"), "a ring needs a Motion Coordinator"),
+        (("--point-format", "width"), "--point-format width: no program prints; give --program, or omit it"),
         (("--closed", "--link", "x"), "--link x: a closed ring has no port"),
     ],
 )  # fmt: skip
@@ -124,7 +134,13 @@ def test_wrong_usage(arguments: tuple[str, ...], text: str, qlinkgen: Run) -> No
 
 
 def test_of_rings_only(qlinkgen: Run) -> None:
-    for options in (("--program", "1=x"), ("--keys", "1=x"), ("--closed",), ("--seconds", "1")):
+    for options in (
+        ("--program", "1=x"),
+        ("--keys", "1=x"),
+        ("--closed",),
+        ("--seconds", "1"),
+        ("--point-format", "width"),
+    ):
         done = qlinkgen("simulate", "qlink", *options)
         assert (done.code, done.out) == (2, "")
         assert f"{options[0]} requires a ring; qlink is a bus with a master" in done.err

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import pytest
 
 from qlinkgen.protocols.trio import KeypadNode
-from qlinkgen.protocols.trio.basic import ProgrammedNode, parse
+from qlinkgen.protocols.trio.basic import Pointed, ProgrammedNode, parse
 from qlinkgen.sim.virtual_ring import VirtualRing
 
 NAME = "trio-fibre-optic-network.txt"
@@ -48,9 +48,11 @@ def changed(text: str, pattern: str, new: str, *, times: int = 1) -> str:
 class Rig:
     """A ring of programs and keypads."""
 
-    def __init__(self, *places: str) -> None:
+    def __init__(self, *places: str, pointed: Pointed = "before") -> None:
         nodes = [
-            KeypadNode(baud=BAUD) if place == "keypad" else ProgrammedNode(parse(place), baud=BAUD)
+            KeypadNode(baud=BAUD)
+            if place == "keypad"
+            else ProgrammedNode(parse(place, pointed=pointed), baud=BAUD)
             for place in places
         ]
         self.ring = VirtualRing(nodes, baud=BAUD)
@@ -132,6 +134,6 @@ def test_two_coordinators_corrected(second: tuple[str, str]) -> None:
 
 def test_six_places_in_all_would_not_fit(second: tuple[str, str]) -> None:
     master, slave = map(completed, second)
-    rig = Rig(master.replace("[6.1]", "[6,1]"), slave, "keypad")
+    rig = Rig(master, slave, "keypad", pointed="width")
     assert rig.keypads[0].lines == ["MACHINE READY", "FEED LENGTH:   0.0", "", ""]
     assert rig.press(ENTER)[1:3] == ["FEED LENGTH:   0.0SP", "EED:0.00"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Literal
 
 from qlinkgen.protocols.trio.basic.expression_parser import ExpressionParser
 from qlinkgen.protocols.trio.basic.expressions import Expression, Number, number_of
@@ -10,11 +11,12 @@ from qlinkgen.protocols.trio.basic.lexer import Kind
 from qlinkgen.protocols.trio.basic.transfers import Control, Formatted, Item, Text
 from qlinkgen.protocols.trio.facts import LINE_END
 
-#: A format with a point, such as 6.1: places before it and after it.
+#: What the 6 of a format such as [6.1] is: the places before the point, or the width, as in [6,1].
+Pointed = Literal["before", "width"]
 _POINTED = re.compile(r"([0-9]{1,3})\.([0-9]{1,3})")
 
 
-def items_of(tokens: ExpressionParser) -> tuple[tuple[Item, ...], str]:
+def items_of(tokens: ExpressionParser, pointed: Pointed) -> tuple[tuple[Item, ...], str]:
     """Return the items of a PRINT after its node, and the end of its line.
 
     The items follow a comma. Between them a semicolon prints nothing, a comma a blank; a semicolon at the
@@ -26,7 +28,7 @@ def items_of(tokens: ExpressionParser) -> tuple[tuple[Item, ...], str]:
     items: list[Item] = []
     if not _ended(tokens):
         tokens.expect(",")
-        items.append(_item(tokens))
+        items.append(_item(tokens, pointed))
     while not _ended(tokens):
         if tokens.skip(Kind.SIGN, ";"):
             if _ended(tokens):
@@ -34,7 +36,7 @@ def items_of(tokens: ExpressionParser) -> tuple[tuple[Item, ...], str]:
         else:
             tokens.expect(",")
             items.append(Text(" "))
-        items.append(_item(tokens))
+        items.append(_item(tokens, pointed))
     return tuple(items), LINE_END
 
 
@@ -42,7 +44,7 @@ def _ended(tokens: ExpressionParser) -> bool:
     return tokens.at(Kind.END) or tokens.at(Kind.SIGN, ":") or tokens.at(Kind.WORD, "ELSE")
 
 
-def _item(tokens: ExpressionParser) -> Item:
+def _item(tokens: ExpressionParser, pointed: Pointed) -> Item:
     if tokens.at(Kind.TEXT):
         return Text(tokens.take().text)
     for word in ("CHR", "CURSOR"):
@@ -51,16 +53,18 @@ def _item(tokens: ExpressionParser) -> Item:
             if len(given) != 1:
                 raise given[1].place.error(f"{word} has {len(given)} arguments; write {word}(number)")
             return Control(word, given[0])
-    return Formatted(tokens.expression(), _form(tokens) if tokens.skip(Kind.SIGN, "[") else ())
+    number = tokens.expression()
+    return Formatted(number, _form(tokens, pointed) if tokens.skip(Kind.SIGN, "[") else ())
 
 
-def _form(tokens: ExpressionParser) -> tuple[Expression, ...]:
+def _form(tokens: ExpressionParser, pointed: Pointed) -> tuple[Expression, ...]:
     if tokens.at(Kind.NUMBER) and tokens.at(Kind.SIGN, "]", ahead=1):
         token = tokens.take()
         tokens.expect("]")
         if (found := _POINTED.fullmatch(token.text)) is not None:
-            before, after = int(found[1]), int(found[2])
-            return Number(token.place, float(before + 1 + after)), Number(token.place, float(after))
+            first, decimals = int(found[1]), int(found[2])
+            width = first if pointed == "width" else first + 1 + decimals
+            return Number(token.place, float(width)), Number(token.place, float(decimals))
         return (number_of(token.place, token.text),)
     form = [tokens.expression()]
     if tokens.skip(Kind.SIGN, ","):

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from qlinkgen.model.spelling import similar
 from qlinkgen.protocols.trio.basic.errors import Place
 from qlinkgen.protocols.trio.basic.expression_parser import ExpressionParser
-from qlinkgen.protocols.trio.basic.items import items_of
+from qlinkgen.protocols.trio.basic.items import Pointed, items_of
 from qlinkgen.protocols.trio.basic.lexer import Kind, Token, tokens_of
 from qlinkgen.protocols.trio.basic.statements import (
     Goto,
@@ -51,18 +51,25 @@ class Program:
     labels: Mapping[str, int]
 
 
-def parse(text: str, file: str = "program") -> Program:
+def parse(text: str, file: str = "program", *, pointed: Pointed = "before") -> Program:
     """Read a program.
+
+    Args:
+        text: the program.
+        file: its name, for messages.
+        pointed: what the 6 of ``PRINT #10,x[6.1]`` is, which the document leaves open: the places before the
+            point, or the width.
 
     Raises:
         BasicError: the first fault, with its place.
     """
-    return _Parser(text, file).program()
+    return _Parser(text, file, pointed).program()
 
 
 class _Parser:
-    def __init__(self, text: str, file: str) -> None:
+    def __init__(self, text: str, file: str, pointed: Pointed) -> None:
         self._file = file
+        self._pointed: Pointed = pointed
         self._tokens = ExpressionParser(tokens_of(text, file))
         self._steps: list[Step] = []
         self._labels: dict[str, int] = {}
@@ -158,7 +165,7 @@ class _Parser:
 
     def _print(self, word: Token) -> Step:
         node = self._tokens.device()
-        items, end = items_of(self._tokens)
+        items, end = items_of(self._tokens, self._pointed)
         return Print(word.place, node, items, end)
 
     def _send(self, word: Token) -> Step:
