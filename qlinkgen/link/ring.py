@@ -44,6 +44,7 @@ from qlinkgen.link.codec import Bus, Encoder, Framed, Message
 from qlinkgen.link.ring_events import (
     Blocked,
     Broken,
+    CommsError,
     NetStat,
     Passed,
     Queued,
@@ -118,6 +119,7 @@ class RingNode:
         cut_through: messages are forwarded while being received.
         passes: messages to others are forwarded; otherwise they are dropped and counted.
         netstat: errors since it was set to 0.
+        commserror: the same in more detail.
         counters: counts of messages and faults.
         events: events, oldest first; the driver removes them.
         verbose: also report each message, not only faults.
@@ -158,6 +160,7 @@ class RingNode:
         self.cut_through = cut_through
         self.passes = True
         self.netstat = NetStat(0)
+        self.commserror = CommsError(0)
         self.counters = RingCounters()
         self.events: deque[RingEvent] = deque(maxlen=EVENTS_KEPT)
         self.verbose = False
@@ -294,6 +297,10 @@ class RingNode:
         faults = self.counters.faults
         faults[kind] = faults.get(kind, 0) + 1
         self.events.append(Broken(now, kind, raw, text, cut_short))
+        if cut_short:
+            self.commserror |= CommsError.TX_STRUCTURE
+        if kind != "crc":
+            self.commserror |= CommsError.RX_STRUCTURE
         self.raise_status(NetStat.RX_CRC if kind == "crc" else NetStat.RX_FRAME, now)
 
     def raise_status(self, bit: NetStat, now: float) -> None:

@@ -24,6 +24,19 @@ class NetStat(IntFlag):
     RX_FRAME = 8
 
 
+class CommsError(IntFlag):
+    """Errors since the status was cleared, in more detail: COMMSERROR of later manuals."""
+
+    #: Received characters found no room in the receive buffer.
+    RX_BUFFER = 1
+    #: Bytes to forward were lost, since the port did not accept them.
+    RETRANSMIT_BUFFER = 2
+    #: A message was received that is incomplete, or has a wrong structure.
+    RX_STRUCTURE = 4
+    #: A message was forwarded in part, since its rest was not received.
+    TX_STRUCTURE = 8
+
+
 class Taken(NamedTuple):
     """A message to this node was received; reported if the engine is verbose."""
 

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from qlinkgen.errors import PortError
 from qlinkgen.link.ring import RingNode
-from qlinkgen.link.ring_events import NetStat, RingEvent
+from qlinkgen.link.ring_events import CommsError, NetStat, RingEvent
 from qlinkgen.transport.port import Port
 
 T = TypeVar("T")
@@ -46,10 +46,13 @@ class NodeIo:
 
     def flush(self, now: float) -> None:
         """Send the output of the engine."""
+        passed = self.node.counters.passed_bytes
         if data := self.node.bytes_to_send(now):
             try:
                 self.port.write(data)
             except PortError:
+                if self.node.counters.passed_bytes != passed:
+                    self.node.commserror |= CommsError.RETRANSMIT_BUFFER
                 self.node.raise_status(NetStat.TX_BUFFER, now)
                 raise
 

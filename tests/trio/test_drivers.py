@@ -16,6 +16,7 @@ from qlinkgen.link.ring import RingNode
 from qlinkgen.link.ring_events import Broken, Passed, RingEvent, Taken
 from qlinkgen.protocols.trio import (
     AsyncMotionCoordinator,
+    CommsError,
     CoordinatorNode,
     MembraneKeypad,
     MotionCoordinator,
@@ -129,7 +130,13 @@ def test_a_port_that_takes_nothing_sets_the_status() -> None:
     broken = MonkeyWrite(near)
     with pytest.raises(PortLost):
         mc.print_(10, "x")
-    assert mc.netstat == NetStat.TX_BUFFER
+    assert (mc.netstat, mc.commserror) == (NetStat.TX_BUFFER, 0)
+    mc.engine.receive(trio.CharacterTransfer(address=2, characters="on").to_frame(), mc.now())
+    with pytest.raises(PortLost):
+        mc.flush()
+    assert mc.commserror == CommsError.RETRANSMIT_BUFFER
+    mc.commserror = 0
+    assert mc.commserror == 0
     broken.undo()
     mc.close()
     far.close()

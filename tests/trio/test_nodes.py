@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from qlinkgen.codecs import trio
-from qlinkgen.link.ring_events import Dropped
+from qlinkgen.link.ring_events import CommsError, Dropped
 from qlinkgen.protocols.trio import CoordinatorNode, KeypadNode, MotionCoordinator
 from qlinkgen.protocols.trio.client import engine_of
 from qlinkgen.transport import open_pty
@@ -29,6 +29,7 @@ def test_what_a_full_buffer_drops_is_told() -> None:
     assert len(node.received) == 256
     assert hear(node, text)[-1:] == ["the receive buffer is full: the last 200 of its characters are lost"]
     assert node.counters.characters_lost == 344
+    assert node.link.commserror == CommsError.RX_BUFFER
     assert [event.at for event in node.link.events if isinstance(event, Dropped)] == [0.0, 0.0]
 
 
@@ -51,6 +52,7 @@ def test_a_wrong_checksum_leaves_the_variable_as_it_was() -> None:
             assert node.vr[5] == 7.5
             frame[place] ^= 1 << bit
     assert node.link.counters.faults == {"crc": 14 * 7}
+    assert node.link.commserror == 0, "the structure of the message is right"
 
 
 def test_a_coordinator_that_is_switched_off_keeps_its_variables() -> None:

@@ -9,7 +9,16 @@ import pytest
 
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring import PATIENCE, RingNode
-from qlinkgen.link.ring_events import Blocked, Broken, NetStat, Passed, Queued, StatusRaised, Taken
+from qlinkgen.link.ring_events import (
+    Blocked,
+    Broken,
+    CommsError,
+    NetStat,
+    Passed,
+    Queued,
+    StatusRaised,
+    Taken,
+)
 
 #: Terminates a message found broken after its head was forwarded: an end byte with the address 0.
 CUT = b"\x80"
@@ -279,6 +288,7 @@ def test_a_message_that_does_not_go_on_is_given_up() -> None:
     line.node.handle_timer(PATIENCE)
     assert line.faults == {"truncated": 1}
     assert line.node.netstat == NetStat.RX_FRAME
+    assert line.node.commserror == CommsError.RX_STRUCTURE
     assert line.node.next_timer() is None
     line.hear(b"CD" + end(1))
     assert line.faults == {"truncated": 1}
@@ -311,6 +321,7 @@ def test_cut_through_ends_a_broken_message_for_the_nodes_behind(name: str) -> No
     assert b"".join(line.hear(data[at : at + 1]) for at in range(len(data))) == expected
     assert line.faults == {"frame": 1}
     assert line.node.netstat == NetStat.RX_FRAME
+    assert line.node.commserror == CommsError.RX_STRUCTURE | CommsError.TX_STRUCTURE
     assert line.node.counters.cut_short == 1
     assert [(event.cut_short, reason in event.text) for event in line.broken()] == [(True, True)]
 

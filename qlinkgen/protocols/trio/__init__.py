@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from qlinkgen.link.ring_events import NetStat
+from qlinkgen.link.ring_events import CommsError, NetStat
 from qlinkgen.protocols.clients import asyncio_clients
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 from qlinkgen.protocols.trio.display import Display
@@ -27,6 +27,7 @@ __all__ = [
     "VALUE",
     "AsyncMembraneKeypad",
     "AsyncMotionCoordinator",
+    "CommsError",
     "CoordinatorNode",
     "Display",
     "KeypadNode",

@@ -11,7 +11,7 @@ from typing import Generic, Protocol, Self, TypeVar
 
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
-from qlinkgen.link.ring_events import NetStat, RingCounters
+from qlinkgen.link.ring_events import CommsError, NetStat, RingCounters
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode, text_message
 from qlinkgen.protocols.trio.errors import NoRoom, NothingCame
 from qlinkgen.protocols.trio.facts import check_channel
@@ -85,6 +85,15 @@ class Client(Generic[N]):
     @netstat.setter
     def netstat(self, status: int) -> None:
         self.engine.netstat = NetStat(status)
+
+    @property
+    def commserror(self) -> CommsError:
+        """The same errors in more detail, as in later manuals; `commserror = 0` clears it."""
+        return self.engine.commserror
+
+    @commserror.setter
+    def commserror(self, status: int) -> None:
+        self.engine.commserror = CommsError(status)
 
     def clear_netstat(self) -> NetStat:
         """Clear the status, and return the old one, atomically."""

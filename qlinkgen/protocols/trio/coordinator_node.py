@@ -12,7 +12,7 @@ from typing import Unpack, cast
 
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
-from qlinkgen.link.ring_events import Dropped
+from qlinkgen.link.ring_events import CommsError, Dropped
 from qlinkgen.protocols.trio.facts import KEYS, LAST_VARIABLE, OFFSET, RECEIVE_BUFFER, VARIABLE, wire_address
 from qlinkgen.protocols.trio.options import NodeOptions
 from qlinkgen.protocols.trio.printing import Number
@@ -89,6 +89,7 @@ class CoordinatorNode:
         lost = len(message.characters) - room
         if lost > 0:
             self.counters.characters_lost += lost
+            self.link.commserror |= CommsError.RX_BUFFER
             text = f"the receive buffer is full: the last {lost} of its characters are lost"
             self.link.events.append(Dropped(now, message, text))
 

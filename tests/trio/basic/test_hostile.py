@@ -26,6 +26,7 @@ EXPRESSIONS = (
     "VR(a)",
     "KEY#4",
     "NETSTAT",
+    "COMMSERROR",
     "a+b*2",
     "a/b",
     "NOT a",
@@ -34,7 +35,17 @@ EXPRESSIONS = (
 )
 SHAPES = (
     *("PRINT #@,@[@]", "PRINT #10,CHR(@)", "PRINT #10,@[6.1],@;", "SEND(@,@,@,@)", "SEND(10,1,@,@)", "WA(@)"),
-    *("VR(@)=@", "a=@", "b=@", "GET #@,a", "GET #4,VR(@)", "DEFKEY(@,@)", "NETSTAT=@", "WAIT UNTIL @"),
+    *(
+        "VR(@)=@",
+        "a=@",
+        "b=@",
+        "GET #@,a",
+        "GET #4,VR(@)",
+        "DEFKEY(@,@)",
+        "NETSTAT=@",
+        "COMMSERROR=@",
+        "WAIT UNTIL @",
+    ),
     *("GOTO loop", "GOSUB sub", "GOSUB loop", "RETURN", "STOP", "REPEAT", "UNTIL @", "IF @ THEN GOTO loop"),
     *("IF @ THEN a=@ ELSE GOSUB sub", "REPEAT: a=a+1: UNTIL @"),
 )

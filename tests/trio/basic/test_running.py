@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from qlinkgen.link.ring_events import NetStat
+from qlinkgen.link.ring_events import CommsError, NetStat
 from qlinkgen.protocols.trio import KeypadNode
 from qlinkgen.protocols.trio.basic import ProgrammedNode, parse
 from qlinkgen.protocols.trio.basic.machine import CALLS, STEPS, TICK
@@ -198,14 +198,20 @@ def test_a_full_transmit_buffer_is_waited_for_then_the_message_is_dropped() -> N
     assert rig.node.link.counters.refused == 1
 
 
-def test_a_program_sees_and_clears_the_status() -> None:
-    rig = Rig("WAIT UNTIL NETSTAT\nVR(0)=NETSTAT\nNETSTAT=0\nVR(1)=1")
+@pytest.mark.parametrize(
+    ("word", "other", "bit"),
+    [("NETSTAT", "COMMSERROR", NetStat.RX_FRAME), ("COMMSERROR", "NETSTAT", CommsError.RX_STRUCTURE)],
+)
+def test_a_program_sees_and_clears_the_status(word: str, other: str, bit: int) -> None:
+    rig = Rig(f"WAIT UNTIL {word}\nVR(0)={word}\n{word}=0\nVR(1)=1\nVR(2)={word}")
     assert rig.node.vr[1] == 0
     rig.node.link.receive(b"\x01", rig.ring.now)
     rig.ring.wire.wake(rig.node.link)
     rig.ring.sleep(0.001)
-    assert (rig.node.vr[0], rig.node.vr[1]) == (NetStat.RX_FRAME, 1)
-    assert rig.node.link.netstat == 0
+    assert (rig.node.vr[0], rig.node.vr[1], rig.node.vr[2]) == (bit, 1, 0)
+    assert getattr(rig.node.link, word.lower()) == 0
+    assert getattr(rig.node.link, other.lower()) != 0
+    assert f"{word} is set to 1; it can only be set to 0" in Rig(f"{word}=1").failure
 
 
 def test_switched_on_again_the_program_begins_again() -> None:

@@ -18,9 +18,9 @@ from qlinkgen.protocols.trio.basic.expressions import (
     Key,
     Name,
     Negative,
-    Netstat,
     Not,
     Number,
+    Status,
     Variable,
     number_of,
 )
@@ -137,8 +137,8 @@ class ExpressionParser:
                 return Name(token.place, text)
             case Kind.WORD, "TRUE" | "FALSE":
                 return Number(token.place, TRUE if token.text == "TRUE" else FALSE)
-            case Kind.WORD, "NETSTAT":
-                return Netstat(token.place)
+            case Kind.WORD, "NETSTAT" | "COMMSERROR":
+                return Status(token.place, token.text)
             case Kind.WORD, "VR":
                 return Variable(token.place, self._bracketed())
             case Kind.WORD, "KEY":
@@ -169,7 +169,7 @@ class ExpressionParser:
         self.expect(")")
         return found
 
-    def target(self, token: Token) -> Name | Variable | Netstat:
+    def target(self, token: Token) -> Name | Variable | Status:
         """Return the variable that begins with a token."""
         match token.kind, token.text:
             case Kind.NAME, name:
@@ -177,6 +177,6 @@ class ExpressionParser:
                 return Name(token.place, name)
             case Kind.WORD, "VR":
                 return Variable(token.place, self._bracketed())
-            case Kind.WORD, "NETSTAT":
-                return Netstat(token.place)
+            case Kind.WORD, "NETSTAT" | "COMMSERROR":
+                return Status(token.place, token.text)
         raise token.place.error(f"found {token}; expected a variable, such as VR(0)")

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from qlinkgen.link.ring_events import NetStat
+from qlinkgen.link.ring_events import CommsError, NetStat
 from qlinkgen.protocols.trio.basic.errors import Place
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 from qlinkgen.protocols.trio.facts import check_channel
@@ -117,20 +117,27 @@ class Variable:
 
 
 @dataclass(frozen=True, slots=True)
-class Netstat:
-    """NETSTAT, the errors of the network since it was set to 0."""
+class Status:
+    """NETSTAT or COMMSERROR, the errors of the network since it was set to 0."""
 
     place: Place
+    word: str
 
     def value(self, scope: Scope) -> float:
         """Return the bits that are set."""
-        return float(scope.node.link.netstat)
+        link = scope.node.link
+        return float(link.netstat if self.word == "NETSTAT" else link.commserror)
 
     def set(self, scope: Scope, value: float) -> None:
         """Clear it. Raises BasicError for another value than 0."""
         if value:
-            raise self.place.error(f"NETSTAT is set to {value:g}; it can only be set to 0, which clears it")
-        scope.node.link.netstat = NetStat(0)
+            raise self.place.error(
+                f"{self.word} is set to {value:g}; it can only be set to 0, which clears it"
+            )
+        if self.word == "NETSTAT":
+            scope.node.link.netstat = NetStat(0)
+        else:
+            scope.node.link.commserror = CommsError(0)
 
 
 @dataclass(frozen=True, slots=True)

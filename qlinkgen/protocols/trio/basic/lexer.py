@@ -11,9 +11,9 @@ from qlinkgen.protocols.trio.basic.errors import Place
 
 #: Words with a meaning of their own; none can be the name of a variable or a label.
 WORDS = frozenset({
-    *("AND", "CHR", "CURSOR", "DEFKEY", "ELSE", "FALSE", "GET", "GOSUB", "GOTO", "IF", "KEY", "NETSTAT"),
-    *("NOT", "OR", "PRINT", "REPEAT", "RETURN", "SEND", "STOP", "THEN", "TRUE", "UNTIL", "VR", "WA", "WAIT"),
-    "XOR",
+    *("AND", "CHR", "COMMSERROR", "CURSOR", "DEFKEY", "ELSE", "FALSE", "GET", "GOSUB", "GOTO", "IF", "KEY"),
+    *("NETSTAT", "NOT", "OR", "PRINT", "REPEAT", "RETURN", "SEND", "STOP", "THEN", "TRUE", "UNTIL", "VR"),
+    *("WA", "WAIT", "XOR"),
 })  # fmt: skip
 
 _LINE_END = re.compile(r"\r\n|\r|\n")

@@ -75,6 +75,7 @@ class _Parser:
         self._labels: dict[str, int] = {}
         self._repeats: list[tuple[Place, int]] = []
         self._statements: Mapping[str, Callable[[Token], Step | None]] = {
+            "COMMSERROR": self._let,
             "DEFKEY": self._defkey,
             "GET": self._get,
             "GOSUB": lambda word: self._goto(word, returns=True),
