@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 from decimal import Decimal
@@ -18,6 +19,7 @@ from qlinkgen.cli.capture_options import CaptureOptions, capture_options
 from qlinkgen.cli.codec import fields, load_codec
 from qlinkgen.cli.common import (
     crc_option,
+    find_message,
     is_hex,
     load_protocol,
     parse_hex,
@@ -26,6 +28,7 @@ from qlinkgen.cli.common import (
     warn_unconfirmed,
 )
 from qlinkgen.cli.decoder import Decoder
+from qlinkgen.cli.filters import Filter, FilterOptions, FlagForm, Flagged, filter_options
 from qlinkgen.cli.streams import Bad, Event
 from qlinkgen.cli.traffic import Place, Placed
 from qlinkgen.link.codec import Fault, Message
@@ -46,8 +49,14 @@ from qlinkgen.model.values import Json, to_json
 @click.option(
     "--request", "request", metavar="HEX", help="The request of the responses, where these depend on it."
 )
-@click.option("--message", "name", metavar="MESSAGE", help="What HEX is, where only its turn tells it.")
 @click.option("--strict", is_flag=True, help="Exit code 1 for any bad frame, or anything that is not read.")
+@click.option(
+    "--flags",
+    type=click.Choice(["number", "names"]),
+    default="number",
+    help="Print flags as a number, or as a list of names.",
+)
+@filter_options
 @capture_options
 @crc_option
 @version_option
@@ -56,8 +65,9 @@ def command(  # noqa: PLR0917  # click passes them by name
     hex_: tuple[str, ...],
     direction: Direction | None,
     request: str | None,
-    name: str | None,
     strict: bool,
+    flags: FlagForm,
+    wanted: FilterOptions,
     capture: CaptureOptions,
     crc: Replacement | None,
     version: str | None,
@@ -95,8 +105,10 @@ def command(  # noqa: PLR0917  # click passes them by name
     given = _given(hex_, capture)
     loaded = load_protocol(protocol, crc, version)
     codec = load_codec(loaded, plain=crc is None)
-    decoder = Decoder(loaded, codec, direction, request, name, capture.baud)
-    printer = _Printer(loaded, several=not isinstance(given, bytes) and len(given) > 1)
+    turned, wanted = _turned(loaded, wanted)
+    decoder = Decoder(loaded, codec, direction, request, turned, capture.baud)
+    several = not isinstance(given, bytes) and len(given) > 1
+    printer = _Printer(loaded, Filter(loaded, wanted), several=several, flags=flags)
     if isinstance(given, bytes):
         printer.show(decoder.traffic({}, exact=True).decode([Record(given, 0)]))
         return printer.result(len(given), strict=True)
@@ -108,6 +120,7 @@ def command(  # noqa: PLR0917  # click passes them by name
         printer.show(file.frames(path), path)
         printer.complain(path, file.problems)
         size += file.size
+    printer.summarise(size)
     return printer.result(size, strict=strict)
 
 
@@ -128,6 +141,14 @@ def _given(words: tuple[str, ...], capture: CaptureOptions) -> bytes | tuple[str
     return words or ("-",)
 
 
+def _turned(protocol: Protocol, wanted: FilterOptions) -> tuple[str | None, FilterOptions]:
+    """Return the message that all bytes are, if only its turn tells it; then messages are not chosen."""
+    if len(wanted.messages) != 1:
+        return None, wanted
+    message = find_message(protocol, wanted.messages[0])
+    return (message.name, replace(wanted, messages=())) if protocol.is_turned(message) else (None, wanted)
+
+
 def _is_file(name: str) -> bool:
     try:
         return Path(name).exists()
@@ -138,9 +159,13 @@ def _is_file(name: str) -> bool:
 class _Printer:
     """Prints frames immediately, and counts them for the exit code."""
 
-    def __init__(self, protocol: Protocol, *, several: bool) -> None:
+    def __init__(self, protocol: Protocol, wanted: Filter, *, several: bool, flags: FlagForm) -> None:
         self._protocol = protocol
+        self._wanted = wanted
         self._several = several  # there are several files: objects name theirs
+        self._flags = Flagged(protocol) if flags == "names" else None
+        self._faults = Counter[str]()
+        self._size = 0  # bytes in frames and in bad frames
         self._good = self._bad = self._unread = 0
         self._warned: set[str] = set()
 
@@ -150,6 +175,10 @@ class _Printer:
             record = self._record(event, place)
             if self._several:
                 record["file"] = file
+            if not self._wanted.keeps(record):
+                continue
+            if self._flags is not None:
+                record = self._flags.named(record)
             sys.stdout.write(f"{jsonlines.line(record)}\n")
             if file == "-":
                 sys.stdout.flush()
@@ -164,6 +193,13 @@ class _Printer:
             warn(f"{name}: {more} further places could not be read")
         self._unread += problems.count
 
+    def summarise(self, size: int) -> None:
+        """Say how many frames and faults there were in so many bytes."""
+        kinds = ", ".join(f"{kind} {count}" for kind, count in sorted(self._faults.items()))
+        bad = f", bad {self._bad} ({kinds})" if kinds else ""
+        outside = max(0, size - self._size)
+        click.echo(f"qlinkgen: frames {self._good}{bad}; {outside} of {size} bytes outside frames", err=True)
+
     def result(self, size: int, *, strict: bool) -> int:
         """Return the exit code; `size`: bytes in all."""
         if not self._good and not self._bad:
@@ -172,8 +208,10 @@ class _Printer:
         return FINE if self._good and not (strict and (self._bad or self._unread)) else WRONG
 
     def _record(self, event: Event, place: Place) -> dict[str, Json]:
+        self._size += place.size
         if isinstance(event, Bad):
             self._bad += 1
+            self._faults[event.kind] += 1
             record: dict[str, Json] = error_record(replace(event, offset=place.offset))
         else:
             self._good += 1
