@@ -22,7 +22,7 @@ from qlinkgen.errors import BadReply, IllegalCommand, LinkError, NoReply
 from qlinkgen.link.attempts import Attempts
 from qlinkgen.link.codec import Framed, Message
 from qlinkgen.link.dialogue import Dialogue
-from qlinkgen.link.events import EVENTS_KEPT, Answered, Damaged, Event, Failed, Sent, TimedOut
+from qlinkgen.link.events import EVENTS_KEPT, Answered, Damaged, Event, Failed, Frame, Sent, TimedOut
 from qlinkgen.link.host_events import Filled, HostCounters, InStep, OutOfStep
 from qlinkgen.link.host_parts import Awaited, Unread, WayBack
 from qlinkgen.link.host_rules import Asked, CommandRules, HostCodec, HostRules
@@ -47,6 +47,8 @@ class HostEngine:
         timing: all deadlines.
         events: events, oldest first; the driver removes them.
         verbose: also report each request and answer, not only irregularities.
+        frames: each packet, answer and fill byte, oldest first, which the driver removes; None, unless
+            somebody is told.
         count: counts of requests, answers and faults.
         in_step: host and device agree on the start of packets, as far as known.
         context: class of the context in force, None if unknown.
@@ -66,6 +68,7 @@ class HostEngine:
         self.rules = rules
         self.events: deque[Event] = deque(maxlen=EVENTS_KEPT)
         self.verbose = True
+        self.frames: deque[Frame] | None = None
         self.count = HostCounters()
         self.in_step = True
         self.context: type[Framed] | None = None
@@ -245,9 +248,18 @@ class HostEngine:
         self.count.requests += 1
         self._attempts.sent_at = now
         self._awaited.ask(asked, self._unread.line_up(asked, now), check=check)
+        return self._sent(asked, self._attempt, now)
+
+    def _sent(self, asked: Asked, attempt: int, now: float) -> bytes:
+        """Report a packet that is sent, and return its bytes."""
         if self.verbose:
-            self.events.append(Sent(now, None, asked.request, self._attempt, asked.frame))
+            self.events.append(Sent(now, None, asked.request, attempt, asked.frame))
+        self._tell(Frame(now, True, asked.frame, asked.request))
         return asked.frame
+
+    def _tell(self, frame: Frame) -> None:
+        if self.frames is not None:
+            self.frames.append(frame)
 
     @property
     def _attempt(self) -> int:
@@ -263,15 +275,14 @@ class HostEngine:
         self._unread.until = self._unread.line_up(asked, now)
         if command.moves:
             self.context = command.makes
-        if self.verbose:
-            self.events.append(Sent(now, None, asked.request, 1, asked.frame))
-        return asked.frame
+        return self._sent(asked, 1, now)
 
     # Receiving ----------------------------------------------------------------------------------------------
 
     def _unasked(self, data: bytes, now: float) -> None:
         """Handle bytes that do not belong to an answer."""
         self.count.skipped += len(data)
+        self._tell(Frame(now, False, data))
         if self.in_step:
             fault = self.codec.Fault("frame", 0, data, "unsolicited bytes")
             self.count.count_damaged("frame")
@@ -285,7 +296,7 @@ class HostEngine:
     def _arrived(self, now: float) -> None:
         """Handle the complete answer, and bytes after it."""
         if self._state is HostState.FILLING:
-            self._filled()
+            self._filled(now)
             return
         awaited = self._awaited
         asked, data, size = awaited.asked, awaited.data, awaited.need
@@ -300,6 +311,7 @@ class HostEngine:
         except self._decode_errors as error:
             self._wrong_answer(getattr(error, "kind", "frame"), data, str(error), now)
             return
+        self._tell(Frame(now, False, raw, response))
         if command.moves:
             self.context = command.makes
         if not awaited.check:
@@ -362,10 +374,14 @@ class HostEngine:
         self.count.fills += 1
         if self.verbose:
             self.events.append(Filled(now, self._way.fill))
-        return self._way.next_fill()
+        fill = self._way.next_fill()
+        self._tell(Frame(now, True, fill))
+        return fill
 
-    def _filled(self) -> None:
+    def _filled(self, now: float) -> None:
         """Continue after an answer to a fill byte, or silence after all: the device is between packets."""
+        if self._awaited.data:
+            self._tell(Frame(now, False, self._awaited.data))
         self._way.filled(self._awaited.data[: self._check_size])
         self._state = _FILLED[self._state]
         self._awaited.stop()  # the next call of bytes_to_send asks
@@ -391,7 +407,9 @@ class HostEngine:
         count = self.count
         count.count_damaged(kind)
         count.illegal += kind == "illegal"
-        self.events.append(Damaged(now, None, self.codec.Fault(kind, 0, data, text)))
+        fault = self.codec.Fault(kind, 0, data, text)
+        self.events.append(Damaged(now, None, fault))
+        self._tell(Frame(now, False, data, None, fault))
         if self._state is HostState.WAITING:
             self._attempts.wrong.append((kind, data))
             self._attempt_failed(text, now, data)
@@ -409,11 +427,12 @@ class HostEngine:
         if data:
             self.count.count_damaged("truncated")
             self.count.skipped += len(data)
+            self._tell(Frame(now, False, data))
         reason = (
             f"{awaited.asked.NAME}: {len(data)} of {awaited.need} bytes received" if data else "no answer"
         )
         if state is HostState.WAITING:
-            if data == self.rules.refusal:  # a refusal of an unknown command has no words
+            if data and data == self.rules.refusal:  # a refusal of an unknown command has no words
                 self._attempts.wrong.append(("illegal", data))
             elif data:
                 self._attempts.wrong.append(("truncated", data))
@@ -428,7 +447,7 @@ class HostEngine:
             self._line.quiet_at = now  # the line is quiet: the next byte goes out at once
             self._line.give_up_at = now + 2 * self._line.quiet
         else:
-            self._filled()
+            self._filled(now)
 
     def _attempt_failed(self, reason: str, now: float, data: bytes) -> None:
         attempts = self._attempts

@@ -34,10 +34,10 @@ _IN_MODULE = frozenset(
     """Message Request Response StreamDecoder Command Counters Fault CodecError EncodeError DecodeError
     Codec Bus OpenEnum BaseMessage ArrayRule BytesRule ConstantRule CountRule IntRule MaskRule
     ScaledRule TextRule RecordRule RecordsRule BaseRecord MaybeRule Misplaced NEW Rule OutOfRange Scale
-    DecimalScale Marking Struct Decimal Self Any Callable Generator AsyncGenerator Iterable Sequence
+    DecimalScale Marking Resync Struct Decimal Self Any Callable Generator AsyncGenerator Iterable Sequence
     BytesLike ClassVar Final Literal LayoutError EachOf UntilStopped
-    Checksum BUS BREAK COMMANDS MESSAGES RECORDS MARKING REFUSALS UNREAD UNREADABLE NAME ID FIELDS RULES
-    ADDRESS EMPTY CHECKED""".split()  # noqa: SIM905
+    Checksum BUS BREAK COMMANDS MESSAGES RECORDS MARKING RESYNC REFUSALS UNREAD UNREADABLE NAME ID FIELDS
+    RULES ADDRESS EMPTY CHECKED""".split()  # noqa: SIM905
 ) | frozenset(dir(builtins))
 
 

@@ -312,6 +312,35 @@ def exchanges_of(commands: Iterable[Command]) -> Iterator[Exchange]:
 
 
 @dataclass(frozen=True, slots=True)
+class Resync:
+    """How a host comes back in step with its device, which may wait for the rest of a packet."""
+
+    #: Command without data or effect, whose answer shows that both are in step.
+    command: str
+    #: Byte that ends a packet which the device has begun.
+    fill: int
+    #: Other bytes that end the packets of some commands.
+    fills: Mapping[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """What commands of a host act on, such as an axis, until another one is selected."""
+
+    #: Attribute of commands, and its values for those that act on the selected one.
+    attribute: str
+    values: tuple[int | bool | str, ...]
+    #: Numbers, and the commands that select them.
+    commands: Mapping[int, str]
+    #: Commands after which it is unknown what is selected.
+    lost_by: tuple[str, ...]
+
+    def decides(self, command: Command) -> bool:
+        """Whether a command acts on what is selected."""
+        return command.attributes.get(self.attribute) in self.values
+
+
+@dataclass(frozen=True, slots=True)
 class Bus:
     """The line and its nodes. ``nodes`` is the (first, last) address, None if frames have no address."""
 
@@ -325,3 +354,6 @@ class Bus:
     section: Text = ""
     #: Names of the sides of a link; () for others, and for a link that does not name them.
     sides: tuple[str, ...] = ()
+    #: Of a host, None if the document does not state it.
+    resync: Resync | None = None
+    selection: Selection | None = None

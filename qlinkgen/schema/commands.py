@@ -14,6 +14,7 @@ from qlinkgen.schema.constants import MAX_BITS
 from qlinkgen.schema.file_commands import AnswerSpec, CommandSpec, RepeatSpec, ResponseWord
 from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.file_model import SchemaFile
+from qlinkgen.schema.hosts import HostChecker, resync_of, selection_of
 from qlinkgen.schema.kind_messages import AnyMessages, KindMessages
 from qlinkgen.schema.kind_names import message_kind, response_kind
 from qlinkgen.schema.kinds import Label
@@ -52,6 +53,8 @@ def build_bus(file: SchemaFile, report: Reporter) -> Bus:
         response_within=_allowance(spec.response_within),
         section=spec.section,
         sides=tuple(spec.sides or ()),
+        resync=resync_of(file),
+        selection=selection_of(file),
     )
 
 
@@ -113,6 +116,7 @@ class CommandBuilder:
             places=self._build.id_places,
             report=self._report,
         )
+        HostChecker(self._file, self._frame, self.commands, self._report).run()
         self._check_only()
         self._check_breaks()
 

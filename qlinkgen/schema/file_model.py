@@ -11,11 +11,14 @@ from typing import Annotated, Literal
 from pydantic import Field, StrictInt
 from pydantic.json_schema import JsonSchemaValue
 
-from qlinkgen.schema.file_base import FileMapping
+from qlinkgen.schema.file_base import FileMapping, Names
 from qlinkgen.schema.file_commands import CommandSpec, DefaultsSpec, MessageSpec, Replies
 from qlinkgen.schema.file_fields import EnumSpec, FlagsSpec, GroupSpec, TypeSpec
 from qlinkgen.schema.file_frames import FrameSpec, KindSpec, OrPartType
 from qlinkgen.schema.kinds import Count, Id, Label, Name, NumberOrName, Order, Text, Time, WholeRange
+
+#: A byte, as a number.
+ByteNumber = Annotated[StrictInt, Field(ge=0, le=255)]
 
 
 class ProtocolSpec(FileMapping):
@@ -26,6 +29,35 @@ class ProtocolSpec(FileMapping):
     revision: Text = Field(description="Revision of the source document")
     source: Text = Field(description="Title of the source document")
     doc: Text = Field(default="", description="Purpose of the protocol")
+
+
+class ResyncSpec(FileMapping):
+    """How a host comes back in step with its device."""
+
+    command: str = Field(
+        description="Command without data or effect, whose answer shows that both are in step"
+    )
+    fill: ByteNumber = Field(
+        default=0, description="Byte that ends a packet which the device has begun; the id of no command"
+    )
+    fills: dict[str, ByteNumber] = Field(
+        default_factory=dict, description="Other bytes that end the packets of some commands"
+    )
+
+
+class SelectSpec(FileMapping):
+    """What commands of a host act on, which others select."""
+
+    attribute: str = Field(description="Attribute of commands, which also names the argument")
+    values: list[Label] = Field(
+        min_length=1, description="Its values for commands that act on the selected one"
+    )
+    commands: dict[str, Id] = Field(
+        min_length=1, description="The commands that select, and the number of what each selects"
+    )
+    lost_by: Names = Field(
+        default_factory=list, description="Commands after which it is unknown what is selected"
+    )
 
 
 class BusSpec(FileMapping):
@@ -49,6 +81,12 @@ class BusSpec(FileMapping):
         default=10, description="Bits on the line per byte: start, data, parity and stop bits"
     )
     response_within: Time | None = Field(default=None, description="Response time limit, if one is stated")
+    resync: ResyncSpec | None = Field(
+        default=None, description="How the host of one device comes back in step with it"
+    )
+    select: SelectSpec | None = Field(
+        default=None, description="What commands of a host act on, which others select"
+    )
 
 
 class AttributeSpec(FileMapping):

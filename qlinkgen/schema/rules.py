@@ -164,6 +164,14 @@ _ALL = (
         "the other passes over, for which frames have an end and a check value of their own.",
     ),
     Rule(
+        "bad-resync",
+        "A host comes back in step by a command that reads, and selects by commands without data.",
+        "The start of a packet is not marked. After a wrong answer the device may wait for the rest of a "
+        "packet: `fill` ends it, one byte at a time, and does nothing to a device in step; the right answer "
+        "to the command shows that both are in step. The host sends this command, and those that select, of "
+        "itself, and their answers have a check value.",
+    ),
+    Rule(
         "part-type",
         "A named type with roles is that of parts of frames.",
         "A role says what the engine does with bits of a frame; a field of a message has none.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from qlinkgen.model.frame import DelimitedFrame, Frame
 from qlinkgen.model.message import Message
@@ -85,16 +85,21 @@ def _check_names(file: SchemaFile, report: Reporter) -> None:
     """Check that nothing is called like a class of one side."""
     ends = ("calls", "node_calls", "handlers")
     taken = {f"{side}_{end}" for side in file.bus.sides or () for end in ends}
-    taken |= {f"async_{name}" for name in taken}
+    refuse_classes(file, taken, "that side", report)
+
+
+def refuse_classes(file: SchemaFile, taken: Collection[str], whose: str, report: Reporter) -> None:
+    """Refuse messages and types that are called like a class of a bus module, blocking or for asyncio."""
     groups: dict[str, Iterable[str]] = {
         "messages": file.messages,
         "enums": file.enums,
         "flags": file.flags,
         "types": file.types,
     }
-    for group, name in ((group, name) for group, names in groups.items() for name in names if name in taken):
-        what = f"{name} is what generated Python calls a class of that side"
-        report.error("name-clash", (group, name), what, "rename it", of_key=True)
+    for group, name in ((group, name) for group, names in groups.items() for name in names):
+        if name.removeprefix("async_") in taken:
+            what = f"{name} is what generated Python calls a class of {whose}"
+            report.error("name-clash", (group, name), what, "rename it", of_key=True)
 
 
 def _obstacle(file: SchemaFile, frame: Frame, messages: Sequence[Message]) -> str:

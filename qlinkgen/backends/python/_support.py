@@ -634,6 +634,49 @@ class Bus:
         return f"Bus({self.kind!r}, {', '.join(f'{name}={getattr(self, name)}' for name in names)})"
 
 
+class Resync:
+    """How a host comes back in step with its device, and what its commands act on.
+
+    Attributes:
+        command: command without data or effect, whose answer shows that both are in step.
+        fill: byte that ends a packet which the device has begun.
+        fills: other bytes that end the packets of some commands.
+        rejected: check value of an answer that rejects its command, empty if there is none.
+        selected: what others act on, such as an axis; empty if nothing is selected.
+        selects: commands that select it, by its number.
+        lost_by: commands after which it is unknown what is selected.
+    """
+
+    __slots__ = (
+        "command",
+        "fill",
+        "fills",
+        "lost_by",
+        "rejected",
+        "selected",
+        "selects",
+    )
+
+    def __init__(
+        self,
+        command: str,
+        *,
+        fill: int = 0,
+        fills: Mapping[str, int] | None = None,
+        rejected: bytes = b"",
+        selected: str = "",
+        selects: Mapping[int, str] | None = None,
+        lost_by: tuple[str, ...] = (),
+    ) -> None:
+        self.command = command
+        self.fill = fill
+        self.fills: Mapping[str, int] = fills or {}
+        self.rejected = rejected
+        self.selected = selected
+        self.selects: Mapping[int, str] = selects or {}
+        self.lost_by = lost_by
+
+
 class Marking:
     """The layout of header and end byte, for nodes that forward a message while receiving it.
 

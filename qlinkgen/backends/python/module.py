@@ -30,6 +30,7 @@ from qlinkgen.backends.python.ways import Ways
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.types import Enum, Flags
 from qlinkgen.plan.coding import Digits
+from qlinkgen.plan.hosts import host_of
 from qlinkgen.plan.transparency import Coded
 from qlinkgen.plan.tree import Plan
 
@@ -114,6 +115,7 @@ class ModuleView:
     flags: Sequence[tables.ConstantsModel]
     messages: Sequence[MessageRow]
     bus: Sequence[str]
+    resync: Sequence[str]
     commands: Sequence[Sequence[str]]
     records: Sequence[MessageRow]
     scales: Sequence[str]
@@ -162,6 +164,7 @@ class Module:
             flags=[tables.flags_model(each, self.place.classes[each.name]) for each in plan.flags],
             messages=[MessageRow(each.name, class_name(each)) for each in plan.messages],
             bus=tables.bus(plan.protocol.bus),
+            resync=tables.resync(plan),
             commands=tables.command_rows(plan, self.place),
             records=[MessageRow(each.name, self.place.classes[each.name]) for each in plan.layouts],
             scales=[*self.builder.scales, *self._field_checks(), *tables.word_tables(plan)],
@@ -257,7 +260,7 @@ class Module:
             case MarkedView():
                 used |= {"Marking", "illegal", "index", "refused"}
             case PacketView():
-                used |= {"short_of"}
+                used |= {"short_of", *(["Resync"] if host_of(plan) else [])}
             case KindsView():
                 used |= {"Checksum", "wrong_check", *view.makers} if view.makers else set()
                 used |= {"illegal", "refused"} if view.address or view.settled else set()
@@ -298,6 +301,7 @@ class Module:
         match view:
             case PacketView():
                 names += ["Request", "Response", "decode_request", "decode_response"]
+                names += ["RESYNC", "Resync"] if host_of(self.plan) else []
             case MarkedView():
                 names += ["MARKING", "Marking"]
             case KindsView():

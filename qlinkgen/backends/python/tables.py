@@ -32,6 +32,7 @@ from qlinkgen.model.transaction import (
 )
 from qlinkgen.model.types import Array, Enum, Flags, NamedValue
 from qlinkgen.model.words import Words
+from qlinkgen.plan.hosts import host_of
 from qlinkgen.plan.proofs import ProofPlan, proof_of
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -110,6 +111,29 @@ def bus(line: Bus) -> list[str]:
         facts = [("first_node", line.nodes[0]), ("last_node", line.nodes[1]), *facts]
     given = [f"{name}={value}" for name, value in facts if value is not None]
     return wrapped("BUS = Bus(", [f'"{line.kind}"', *given], ")", 0)
+
+
+def resync(plan: Plan) -> list[str]:
+    """The call that describes how a host comes back in step; no lines if the schema does not."""
+    host = host_of(plan)
+    if host is None:
+        return []
+    fills = [f'"{name}": 0x{byte:02X}' for name, byte in host.fills.items()]
+    selects = [f'{number}: "{name}"' for number, name in host.selects.items()]
+    lost = [f'"{name}"' for name in host.lost_by]
+    given = [
+        [f'"{host.command}"'],
+        [f"fill=0x{host.fill:02X}"],
+        *([wrapped("fills={", fills, "}", 5)] if fills else []),
+        *([[f"rejected={literal(host.rejected)}"]] if host.rejected else []),
+        *([[f'selected="{host.selected}"']] if host.selected else []),
+        *([wrapped("selects={", selects, "}", 5)] if selects else []),
+        *([wrapped("lost_by=(", lost, ",)" if len(lost) == 1 else ")", 5)] if lost else []),
+    ]
+    if all(len(each) == 1 for each in given):
+        return wrapped("RESYNC = Resync(", (line for each in given for line in each), ")", 0)
+    lines = [f"    {line}" for each in given for line in (*each[:-1], f"{each[-1]},")]
+    return ["RESYNC = Resync(", *lines, ")"]
 
 
 def command_rows(plan: Plan, place: Place) -> list[list[str]]:

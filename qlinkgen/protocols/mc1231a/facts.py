@@ -8,10 +8,6 @@ from qlinkgen.codecs import mc1231a
 from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.link.host_rules import HostRules
 
-AXES: Final = (1, 2)
-#: Packet that selects an axis.
-SELECT: Final[dict[int, mc1231a.Request]] = {1: mc1231a.Set1Request(), 2: mc1231a.Set2Request()}
-
 #: Latched bits of the status word.
 EVENTS: Final = (
     AxisStatus.MOTION_COMPLETE
@@ -25,20 +21,11 @@ EVENTS: Final = (
     | AxisStatus.COMMUTATION_ERROR
 )
 
-#: Fill bytes: 0x00 and 0xFF are not commands. As data, zeros update no axis and move little; but in the masks
-#: of events to keep they would clear events, where ones have no effect.
-RULES: Final = HostRules(
-    proof=mc1231a.GetStatusRequest(),
-    context=SELECT[1],
-    contexts={
-        mc1231a.Set1Request: mc1231a.Set1Request,
-        mc1231a.Set2Request: mc1231a.Set2Request,
-        mc1231a.SetIRequest: None,
-        mc1231a.ResetRequest: None,
-    },
-    fill=0x00,
-    fills={mc1231a.RstStatusRequest: 0xFF, mc1231a.RstIntrptRequest: 0xFF},
-)
+#: How the host comes back in step, and selects an axis.
+RULES: Final = HostRules.of(mc1231a)
+#: Packet that selects an axis.
+SELECT: Final = RULES.selects
+AXES: Final = tuple(SELECT)
 
 
 def check_axis(axis: int) -> int:
