@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
-from qlinkgen.link.codec import Codec, Command, EachOf, Framed, Many, Message, UntilStopped, address_of
+from qlinkgen.link.codec import Command, EachOf, Framed, Many, Message, Module, UntilStopped, address_of
 
 if TYPE_CHECKING:
     from typing_extensions import TypeIs
@@ -29,14 +29,14 @@ def nodes_asked(many: Many, request: Message) -> Sequence[int] | None:
     return [int(getattr(item, many.key)) for item in listed] if many.key else list(map(int, listed))
 
 
-def stops(codec: Codec) -> Iterator[tuple[Command, Stop]]:
+def stops(codec: Module) -> Iterator[tuple[Command, Stop]]:
     """The commands whose answers only another command ends, and how it does."""
     for command in codec.COMMANDS.values():
         if is_endless(command.many):
             yield command, Stop(command.many, codec)
 
 
-def has_endless(codec: Codec) -> bool:
+def has_endless(codec: Module) -> bool:
     """Whether only other commands end some answers: these need a line for each direction.
 
     On one line for both, a node that sends all the time leaves the master no time to stop it.
@@ -49,7 +49,7 @@ class Stop:
 
     __slots__ = ("_broadcast", "_compared", "_make", "_repeats", "_to_all", "command")
 
-    def __init__(self, many: UntilStopped, codec: Codec) -> None:
+    def __init__(self, many: UntilStopped, codec: Module) -> None:
         """``many`` is that of the command with these answers."""
         self.command: Command = codec.COMMANDS[many.stopped_by]
         self._broadcast = codec.BUS.broadcast

@@ -91,14 +91,12 @@ class ChipSet:
 
     # Commands -----------------------------------------------------------------------------------------------
 
-    def knows(self, request: type[mc1231a.Request]) -> bool:
-        """Whether a command, by the class of its request, is legal here."""
-        return self._handlers[request][0] not in self.illegal
-
-    def handle(self, request: mc1231a.Request, now: float) -> mc1231a.Response:
-        """Execute a packet; return its response."""
+    def handle(self, request: mc1231a.Request, now: float) -> mc1231a.Response | None:
+        """Execute a packet; return its response, None if the command is illegal here."""
+        name, handler, respond = self._handlers[type(request)]
+        if name in self.illegal:
+            return None
         self.advance(now)
-        _, handler, respond = self._handlers[type(request)]
         result = handler(request)
         self._look_at_interrupts()
         return respond(result)
