@@ -28,6 +28,7 @@ NAMES = {
     "aclosing": "closing",
     "aio": "blocking",
     "aio_peers": "peers",
+    "host_aio": "host",
 }
 #: Words of prose.
 PROSE = {
@@ -79,6 +80,11 @@ PAIRS = (
             " for asyncio; `qlinkgen.bus.blocking` is derived from it.": f".\n\n{_DERIVED}\n",
             " Opening is fast, so it is synchronous.": "",
         },
+    ),
+    Pair(
+        "qlinkgen/bus/host_aio.py",
+        "qlinkgen/bus/host.py",
+        {" for asyncio; `qlinkgen.bus.host` is derived from it.": f".\n\n{_DERIVED}\n"},
     ),
     Pair(
         "qlinkgen/protocols/qlink/aio.py",

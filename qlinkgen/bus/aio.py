@@ -9,7 +9,7 @@ from typing import Any, Generic, Self, TypeVar, Unpack
 from qlinkgen.bus.making import check_node, make_master, make_peer, open_line
 from qlinkgen.bus.options import BusOptions, LinkOptions, MasterOptions, Parity, PeerOptions, StopBits
 from qlinkgen.bus.watching import Watched
-from qlinkgen.link.codec import Codec, Framed
+from qlinkgen.link.codec import Codec, Framed, Module
 from qlinkgen.link.dialogue import Dialogue
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Event, Frame
@@ -33,7 +33,7 @@ class AsyncCalls(Watched, AsyncMaster):
         codec: the generated module of the protocol.
     """
 
-    codec: Codec
+    codec: Module
 
     async def ask(self, request: Framed, response: type[R]) -> R:  # noqa: ARG002  # for type checkers
         """Send a request and return its response."""
@@ -109,6 +109,7 @@ class AsyncBus(AsyncCalls):
         engine: deadlines, counters, health.
     """
 
+    codec: Codec
     accepts: Mapping[str, Accepts] | None = None
     usual_echo: EchoMode = "none"
     engine: MasterEngine
@@ -218,6 +219,7 @@ class AsyncLink(AsyncCalls, AsyncPeer):
         engine: both halves.
     """
 
+    codec: Codec
     engine: PeerEngine
 
     def __init__(

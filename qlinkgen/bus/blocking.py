@@ -12,7 +12,7 @@ from typing import Any, Generic, Self, TypeVar, Unpack
 from qlinkgen.bus.making import check_node, make_master, make_peer, open_line
 from qlinkgen.bus.options import BusOptions, LinkOptions, MasterOptions, Parity, PeerOptions, StopBits
 from qlinkgen.bus.watching import Watched
-from qlinkgen.link.codec import Codec, Framed
+from qlinkgen.link.codec import Codec, Framed, Module
 from qlinkgen.link.dialogue import Dialogue
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Event, Frame
@@ -36,7 +36,7 @@ class Calls(Watched, BlockingMaster):
         codec: the generated module of the protocol.
     """
 
-    codec: Codec
+    codec: Module
 
     def ask(self, request: Framed, response: type[R]) -> R:  # noqa: ARG002  # for type checkers
         """Send a request and return its response."""
@@ -110,6 +110,7 @@ class Bus(Calls):
         engine: deadlines, counters, health.
     """
 
+    codec: Codec
     accepts: Mapping[str, Accepts] | None = None
     usual_echo: EchoMode = "none"
     engine: MasterEngine
@@ -219,6 +220,7 @@ class Link(Calls, BlockingPeer):
         engine: both halves.
     """
 
+    codec: Codec
     engine: PeerEngine
 
     def __init__(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from logging import Logger
 from typing import Literal, TypedDict
 
@@ -62,6 +62,26 @@ class PeerOptions(AskingOptions, total=False):
     turnaround: float
 
 
+#: Commands whose check value is read: all, none, or those listed.
+Checksum = Literal["always", "never"] | Collection[str]
+
+
+class HostEngineOptions(AskingOptions, total=False):
+    """Options of the engine of a host.
+
+    checksum: commands whose check value is read: "always", "never", or names. Without it, the loss or
+        corruption of a packet is not detected.
+    forgets: seconds of silence after which the device discards an incomplete packet; 0 if it never does.
+    """
+
+    checksum: Checksum
+    forgets: float
+
+
+class HostOptions(HostEngineOptions, Observers, total=False):
+    """Options of the host of a device."""
+
+
 class BusOptions(MasterOptions, Observers, total=False):
     """Options of a bus."""
 
@@ -84,4 +104,17 @@ class SlaveOptions(TypedDict, total=False):
     turnaround: float | None
     echo: Literal["expect", "none"]
     slack: float | None
+    on_frame: Callable[[Frame], None] | None
+
+
+class DeviceOptions(TypedDict, total=False):
+    """Options of the device at a host's port.
+
+    turnaround: seconds from the end of a packet to its answer.
+    forgets: seconds of silence within a packet after which it is discarded; 0, the default: never.
+    on_frame: called with each packet and answer, and with bytes that are none.
+    """
+
+    turnaround: float
+    forgets: float
     on_frame: Callable[[Frame], None] | None

@@ -9,15 +9,19 @@ first answer brings all its requests back.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from qlinkgen.errors import LinkError, NoReply
 from qlinkgen.link.codec import Framed, Module
+from qlinkgen.link.dialogue import Dialogue
 from qlinkgen.link.health import HealthBook, HealthPolicy
 from qlinkgen.link.procedure import Ask, Pause, Procedure, Tell
-from qlinkgen.link.transaction import Reply
+from qlinkgen.link.transaction import Packet, Question, Reply
+
+if TYPE_CHECKING:
+    from qlinkgen.link.host_rules import HostRules
 
 #: A node, None where frames have no address, and a command.
 Key = tuple[int | None, str]
@@ -94,7 +98,7 @@ class _Turn:
 
     __slots__ = ("due", "key", "period", "request", "statistics")
 
-    def __init__(self, key: Key, request: Framed, period: float, due: float) -> None:
+    def __init__(self, key: Key, request: Question, period: float, due: float) -> None:
         self.key = key
         self.request = request
         self.period = period
@@ -122,6 +126,7 @@ class Poller:
         *,
         requests: Requests | None = None,
         policy: HealthPolicy | None = HealthPolicy(),  # noqa: B008  # immutable
+        rules: HostRules | None = None,
     ) -> None:
         """Make the requests.
 
@@ -131,6 +136,7 @@ class Poller:
                 None for the node, where frames have no address.
             requests: those of commands that need values; others have their defaults.
             policy: when a node is silent, and how often it is tried; None: all requests keep their periods.
+            rules: of the host of a device, where the number of a key may be that of what is selected.
 
         Raises:
             ValueError: a period is not above 0, no request is given, a command is unknown, or a key names a
@@ -139,13 +145,17 @@ class Poller:
         """
         if not periods:
             raise ValueError("periods: no request was given; give at least one, {(3, 'name'): 0.5}")
-        given = {_key(codec, each): request for each, request in (requests or {}).items()}
+        selected = rules.selects if rules else {}
+        given = {_key(codec, each, selected): request for each, request in (requests or {}).items()}
         self._turns: list[_Turn] = []
         for each, period in periods.items():
-            key = _key(codec, each)
+            key = _key(codec, each, selected)
             if not 0 < period < math.inf:
                 raise ValueError(f"periods: {period} s of {key} must be above 0 and finite")
-            request = given[key] if key in given else request_of(codec, *key)
+            number = None if key[0] in selected else key[0]
+            request: Question = given[key] if key in given else request_of(codec, number, key[1])
+            if rules and key[0] is not None and not isinstance(request, Packet | Dialogue):
+                request = rules.packet(request, key[0])
             self._turns.append(_Turn(key, request, period, 0.0))
         self._turns.sort(key=lambda turn: turn.period)
         self._health = HealthBook(policy, untracked=())
@@ -210,13 +220,13 @@ class Poller:
         self._health.answered(node)
 
 
-def _key(codec: Module, given: Key | str) -> Key:
-    """The node and the command of a key."""
+def _key(codec: Module, given: Key | str, selected: Collection[int]) -> Key:
+    """The node and the command of a key; with a host, the number of what it selects."""
     node, name = (None, given) if isinstance(given, str) else given
     if name not in codec.COMMANDS:
         raise ValueError(f"unknown command {name!r}; commands are {', '.join(codec.COMMANDS)}")
     addressed = bool(codec.COMMANDS[name].request.ADDRESS)
-    if node is not None and not addressed:
+    if node is not None and node not in selected and not addressed:
         raise ValueError(f"{given!r} names a node, but frames of {name} have no address; give {name!r}")
     if node is None and addressed:
         raise ValueError(f"{given!r} names no node, but frames of {name} have an address; give (1, {name!r})")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import cast
 
 from qlinkgen.link.asked import answer_to
 from qlinkgen.link.codec import Codec, Command, Echoes, Framed, Many, Message, is_message
+from qlinkgen.link.device import DeviceCodec
 from qlinkgen.link.many import is_endless, is_listed, nodes_asked
 from qlinkgen.link.slave_dialogue import Handling, Refusal
 from qlinkgen.link.turn import is_turned
@@ -34,7 +36,7 @@ class GenericNode:
 
     def __init__(
         self,
-        codec: Codec,
+        codec: Codec | DeviceCodec,
         number: int = 0,
         plan: Plan | None = None,
         *,
@@ -194,7 +196,8 @@ class GenericNode:
         deciding = {test.value for field in plan.message.fields for test in field.when}
         if not deciding.intersection(plan.message.echoes):
             return message
-        asked = self._codec.encode(request)
+        codec = cast(Codec, self._codec)  # packets have no such fields
+        asked = codec.encode(request)
         decoded = interpreter.decode(asked, "request")
         values = {**decoded.beside, **decoded.values, request.ADDRESS: decoded.address}
         command = next(each for each in interpreter.plan.commands if each.request.name == request.NAME)
@@ -209,8 +212,8 @@ class GenericNode:
         wire = interpreter.encode(message.NAME, settled, address, asked)
         if is_turned(type(message)):
             return type(message).from_bytes(wire)
-        (heard,) = filter(is_message, self._codec.StreamDecoder("response").feed(wire))
-        make = answer_to(self._codec)
+        (heard,) = filter(is_message, codec.StreamDecoder("response").feed(wire))
+        make = answer_to(codec)
         return make(request, heard) if make else heard
 
 

@@ -8,8 +8,11 @@ from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
 from qlinkgen.bus import aio, blocking
+from qlinkgen.bus.host import Host
+from qlinkgen.bus.host_aio import AsyncHost
 from qlinkgen.bus.making import make_peer
 from qlinkgen.link.codec import Codec
+from qlinkgen.link.device import DeviceCodec, DeviceEngine
 from qlinkgen.link.many import has_endless
 from qlinkgen.link.peer import PeerEngine
 from qlinkgen.link.slave import Node, SlaveEngine
@@ -33,12 +36,12 @@ class Joined(Generic[M]):
 
     Attributes:
         master: the master, or one side of a link.
-        others: the engines of the slaves, or of the other side.
+        others: the engines of the slaves, of the other side, or of the device of a host.
         wire: the line, with its faults and taps.
     """
 
     master: M
-    others: tuple[SlaveEngine | PeerEngine, ...]
+    others: tuple[SlaveEngine | PeerEngine | DeviceEngine, ...]
     wire: Wire
 
 
@@ -65,13 +68,14 @@ def join(
         options: options of the class, such as `attempts`.
     """
     codec = master.codec
+    host = _is_host(master)
     speed = codec.BUS.baud or USUAL_SPEED
     paced = transport == "virtual"
     wire = Wire(
         baud=speed if paced else None,
         bits_per_byte=codec.BUS.bits_per_byte,
         faults=faults,
-        collisions=not has_endless(codec),
+        collisions=not host and not has_endless(codec),  # a host has a line for each direction
     )
     with (
         _port(wire, transport, speed) as port,
@@ -101,10 +105,10 @@ def join_at(
         own: see there.
         options: see there.
     """
-    codec = master.codec
+    codec: Any = master.codec  # its class depends on the kind
     nodes = handlers or (_usual(codec),)
     both = issubclass(master, blocking.Link | aio.AsyncLink)
-    others = tuple(_engine(codec, port, each, turnaround, both=both) for each in nodes)
+    others = tuple(_engine(master, port, each, turnaround) for each in nodes)
     for engine in others:
         wire.attach(engine)
     given = (own or _usual(codec),) if both else ()
@@ -114,14 +118,21 @@ def join_at(
         yield Joined(made, others, wire)
 
 
-def _usual(codec: Codec) -> GenericNode:
+def _usual(codec: Codec | DeviceCodec) -> GenericNode:
     return GenericNode(codec, codec.BUS.first_node or 0)
 
 
+def _is_host(master: type[M]) -> bool:
+    return issubclass(master, Host | AsyncHost)
+
+
 def _engine(
-    codec: Codec, port: Port, handlers: Node, turnaround: float, *, both: bool
-) -> SlaveEngine | PeerEngine:
-    if both:
+    master: type[M], port: Port, handlers: Node, turnaround: float
+) -> SlaveEngine | PeerEngine | DeviceEngine:
+    codec: Any = master.codec  # its class depends on the kind
+    if _is_host(master):
+        return DeviceEngine(codec, handlers, turnaround=turnaround)
+    if issubclass(master, blocking.Link | aio.AsyncLink):
         return make_peer(codec, port, handlers, turnaround=turnaround)
     return SlaveEngine(codec, handlers, turnaround=turnaround, baud=port.baud)
 

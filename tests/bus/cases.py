@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -10,6 +12,7 @@ from qlinkgen.link import Timing
 from qlinkgen.link.asked import answer_to
 from qlinkgen.link.codec import meanings
 from qlinkgen.link.many import is_endless, is_listed
+from qlinkgen.model.naming import method
 from qlinkgen.sim.smallest import required_values
 from tests.bus.wires import codec_of
 from tests.library.protocols import described
@@ -27,7 +30,7 @@ class Case:
     Attributes:
         protocol: the protocol.
         command: the command of the generated module.
-        where: the address, empty without one.
+        where: the address, or the number of what a host selects; empty without one.
         values: arguments of its method.
     """
 
@@ -39,6 +42,11 @@ class Case:
     def __str__(self) -> str:
         """Name it in a failure."""
         return f"{self.protocol}: {self.command.name}"
+
+    @property
+    def node(self) -> int | None:
+        """The address in the error of a call."""
+        return self.where[0] if self.where and self.command.request.ADDRESS else None
 
     @property
     def shape(self) -> Shape:
@@ -77,7 +85,8 @@ class Case:
     @property
     def told_apart(self) -> bool:
         """Its answer differs from those to other commands, whatever the request was."""
-        return self.shape == "one" and answer_to(codec_of(self.protocol)) is None
+        codec = codec_of(self.protocol)
+        return self.shape == "one" and answer_to(codec) is None and codec.BUS.kind != "host"
 
 
 def numbers_of(codec: Any) -> list[int]:
@@ -107,7 +116,18 @@ def called(codec: Any, node: int | None) -> Iterator[tuple[Any, list[int], dict[
             usual = command.request(**values, **{command.request.ADDRESS: node})
             values[listed] = type(getattr(usual, listed))([node])
         addressed = command.request.ADDRESS and command.addressing != "broadcast"
-        yield command, [node] if addressed and node is not None else [], values
+        where = [node] if addressed and node is not None else []
+        yield command, where or selected(codec, command), values
+
+
+def selected(codec: Any, command: Any) -> list[int]:
+    """The number of what a command of a host acts on, if it is an argument of its method."""
+    rules = getattr(codec, "RESYNC", None)
+    if rules is None or not rules.selects:
+        return []
+    calls = importlib.import_module(f"{codec.__name__}_bus").HostCalls
+    taken = inspect.signature(getattr(calls, method(command.name))).parameters
+    return [max(rules.selects)] if rules.selected in taken else []
 
 
 def cases_of(protocol: str, *shapes: Shape, that: Callable[[Case], bool] = lambda _: True) -> list[Case]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import inspect
 import random
 from collections import deque
 from collections.abc import Callable, Coroutine, Iterator
@@ -14,8 +15,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from qlinkgen.bus.blocking import Link
+from qlinkgen.bus.host import Host
+from qlinkgen.bus.host_aio import AsyncHost
 from qlinkgen.link import Timing
 from qlinkgen.link.events import Event
+from qlinkgen.link.host_events import HostCounters
 from qlinkgen.model.naming import method
 from qlinkgen.sim import FaultPlan, VirtualPort, Wire
 from qlinkgen.sim.fault_record import Disturbed
@@ -193,6 +197,26 @@ class Rig:
         found: Timing = getattr(engine, "master", engine).timing
         return found
 
+    @property
+    def hosted(self) -> bool:
+        """The master is the host of a device."""
+        return isinstance(self.master, Host | AsyncHost)
+
+    def tries(self, case: Case, attempts: int) -> int:
+        """The transmissions of a request without a right answer: one if a host stays out of step."""
+        return attempts if case.command.repeat_safe and not self.hosted else 1
+
+    def select(self, case: Case) -> None:
+        """Let a host select what a command acts on, and count from there."""
+        if self.hosted and case.where:
+            self.ask(case)
+            self.master.engine.count = HostCounters()
+            self.events.clear()
+            self.sent.clear()
+            for node in self.nodes:
+                node.made.clear()
+                node.heard.clear()
+
     def call(self, case: Case, **other: Any) -> Any:
         """Call the method of a command: its result, or a coroutine."""
         return getattr(self.master, method(case.command.name))(*case.where, **{**case.values, **other})
@@ -214,14 +238,14 @@ class Rig:
         for node in self.nodes:
             node.made.clear()
         told = frames_of(self.ask(case))
-        made = {each.to_frame() for node in self.nodes for each in node.made}
+        made = {wire_of(each) for node in self.nodes for each in node.made}
         assert made.issuperset(told)
         return max(map(len, told))
 
     def check(self, result: Any) -> None:
         """Compare answers to the last ones of the slaves."""
         told = frames_of(result)
-        made = [each.to_frame() for node in self.nodes for each in node.made]
+        made = [wire_of(each) for node in self.nodes for each in node.made]
         assert told
         assert told == made[-len(told) :]
 
@@ -239,7 +263,14 @@ def frames_of(result: Any) -> list[bytes]:
     """The frames of the answers that a call returns."""
     if isinstance(result, dict):
         result = list(result.values())
-    return [each.to_frame() for each in (result if isinstance(result, list | tuple) else [result])]
+    return [wire_of(each) for each in (result if isinstance(result, list | tuple) else [result])]
+
+
+def wire_of(answer: Any) -> bytes:
+    """The frame of an answer; of a packet its payload, with zeros for the check value over its request."""
+    if "request" in inspect.signature(answer.to_frame).parameters:
+        return bytes(answer.to_bytes().ljust(answer.MAX_WIRE_SIZE, b"\0"))
+    return bytes(answer.to_frame())
 
 
 @decided_by_parameter
@@ -264,12 +295,13 @@ def make_rig(
         bits_per_byte=codec.BUS.bits_per_byte,
         faults=script,
         echo=echoes,
+        collisions=not has_host(protocol),  # which has a line for each direction
     )
-    numbers = numbers_of(codec)[: 1 if both_ask(protocol) else 2]
+    numbers = numbers_of(codec)[: 1 if both_ask(protocol) or has_host(protocol) else 2]
     refusals = Refusals(codec, {refused: 1.0}) if refused else None
     nodes = [Slave(codec, number, refusals) for number in numbers]
     given = {"slack": SLACK[setting.transport], **options}
-    if not both_ask(protocol):
+    if not both_ask(protocol) and not has_host(protocol):
         given = {"health": None, "echo": "expect" if echoes else "none", **given}
     with contextlib.ExitStack() as stack:
         port, loop_factory = stack.enter_context(_port(setting, wire))
@@ -288,6 +320,11 @@ def make_rig(
 def both_ask(protocol: str) -> bool:
     """Both sides of the link ask."""
     return issubclass(asker(protocol), Link)
+
+
+def has_host(protocol: str) -> bool:
+    """The protocol has a host and its device."""
+    return issubclass(asker(protocol), Host)
 
 
 @contextlib.contextmanager

@@ -14,8 +14,8 @@ from tests.bus.rig import Rig, Setting, make_rig
 
 #: Protocols of the library with transactions.
 NAMES = (
-    "cobs", "dnp3", "dynamixel_1", "dynamixel_2", "mbus", "modbus_ascii", "modbus_rtu", "msp", "pelco_d",
-    "qlink", "shdlc", "slip", "stm32", "tmcl", "ubx", "vesc", "visca", "xbee",
+    "cobs", "dnp3", "dynamixel_1", "dynamixel_2", "mbus", "mc1231a", "modbus_ascii", "modbus_rtu", "msp",
+    "pelco_d", "qlink", "shdlc", "slip", "stm32", "tmcl", "ubx", "vesc", "visca", "xbee",
 )  # fmt: skip
 #: Those that are tried over a pty, too: all if the environment says so.
 ON_PTYS = NAMES if os.environ.get("QLINKGEN_PTYS") == "all" else ("dynamixel_2", "tmcl")
@@ -45,6 +45,7 @@ def rig_for(case: Case, setting: Setting, **options: Any) -> Iterator[Rig]:
     """A rig to try one command on, which a failure names."""
     try:
         with make_rig(setting, case.protocol, **options) as rig:
+            rig.select(case)
             yield rig
     except BaseException as error:
         error.add_note(str(case))

@@ -20,7 +20,7 @@ from tests.bus.wires import codec_of
 
 def test_every_protocol_is_tried() -> None:
     """So is every kind of command, of which each protocol has one."""
-    assert set(NAMES) == {name for name in library() if load(find(name)).commands} | {"qlink"}
+    assert set(NAMES) == {name for name in library() if load(find(name)).commands} | {"qlink", "mc1231a"}
     shapes = [{case.shape for case in cases_of(name, *get_args(Shape))} for name in NAMES]
     assert all(shapes)
     assert set().union(*shapes) == set(get_args(Shape))

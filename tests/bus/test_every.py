@@ -14,8 +14,8 @@ from qlinkgen.sim.joining import join
 from tests.bus.cases import called
 from tests.bus.wires import asker, codec_of
 
-#: Several answers of each kind, dialogues, other replies, silences, a link, frames with and without nodes.
-NAMES = ("modbus_rtu", "ubx", "visca", "dnp3", "stm32", "dynamixel_2", "tmcl")
+#: Several answers of each kind, dialogues, other replies, silences, a link, with and without nodes, a host.
+NAMES = ("modbus_rtu", "ubx", "visca", "dnp3", "stm32", "dynamixel_2", "tmcl", "mc1231a")
 
 
 def check(command: Any, answer: Any) -> None:
@@ -40,7 +40,8 @@ def test_blocking(name: str) -> None:
         for command, where, values in called(codec, codec.BUS.first_node):
             faces = [(pair.master, where)]
             if where:
-                faces.append((pair.master.node(*where), []))
+                one = getattr(getattr(codec, "RESYNC", None), "selected", "node")
+                faces.append((getattr(pair.master, one)(*where), []))
             for face, address in faces:
                 answer = getattr(face, method(command.name))(*address, **values)
                 count += 1

@@ -207,7 +207,7 @@ def test_a_host_must_define_how_packets_are_sent(caller: str) -> None:
 def test_docstrings_of_a_host_match_the_schema() -> None:
     calls = bus_of("mc1231a").HostCalls
     assert "Double buffered." in calls.set_pos.__doc__
-    assert "axis: Axis to act on, from 1." in calls.set_pos.__doc__
+    assert "axis: Axis to act on, 1 or 2." in calls.set_pos.__doc__
     assert "Axis by mask." in calls.multi_update.__doc__
     assert "Axis current" not in calls.set_kp.__doc__
     assert "Axis unknown." in calls.lmts_on.__doc__
@@ -226,15 +226,16 @@ frame:
     code: {role: message, type: u8}
     data: {role: payload, size: 0..4}
     checksum: {role: checksum, type: u16, algorithm: sum16, words: 2, rejected: 0}
-bus: {kind: host}
+bus: {kind: hostBUS}
 defaults: {repeat: safe}
 COMMANDS
 """
 
 
-def small_host(commands: str) -> tuple[Any, Any]:
+def small_host(commands: str, bus: str = "") -> tuple[Any, Any]:
     """Codec and bus module of a small protocol of a host."""
-    model, faults = loads(HOST_SCHEMA.replace("COMMANDS", commands), "small_host.yaml")
+    text = HOST_SCHEMA.replace("COMMANDS", commands).replace("BUS", bus)
+    model, faults = loads(text, "small_host.yaml")
     assert model, faults
     codec = load(model)
     return codec, loaded(model, codec)
@@ -242,7 +243,7 @@ def small_host(commands: str) -> tuple[Any, Any]:
 
 def test_a_host_of_a_device_without_axes() -> None:
     codec, made = small_host("commands: {go: {id: 1, request: {axis: u16}, response: {}}}")
-    assert made.__all__ == ["AsyncHostCalls", "HostCalls"]
+    assert made.__all__ == ["AsyncHostCalls", "HostCalls", "SlaveHandlers"]
     notes = []
     calls = type("Calls", (made.HostCalls,), {"ask": lambda self, *given: notes.append(given)})()
     calls.go(axis=3)
@@ -254,7 +255,9 @@ def test_a_field_may_be_called_axis_too_and_not_everything_is_answered() -> None
         "attributes: {axis: {values: [current, global]}}\n"
         "commands:\n"
         "  go: {id: 1, request: {axis: u16}, response: none, attributes: {axis: current}}\n"
-        "  halt: {id: 2, request: {}, response: none, attributes: {axis: global}}"
+        "  halt: {id: 2, request: {}, response: none, attributes: {axis: global}}\n"
+        "  pick: {id: 3, request: {}, response: {}, attributes: {axis: global}}",
+        ", select: {attribute: axis, values: [current], commands: {pick: 2}}",
     )
     notes = []
     calls = type("Calls", (made.HostCalls,), {"tell": lambda self, *given: notes.append(given)})()
@@ -320,9 +323,19 @@ def test_one_handler_is_replaced_at_a_time() -> None:
 # Files
 
 
-def test_rings_have_none_and_neither_has_the_far_side_of_a_host() -> None:
+def test_rings_have_none_and_each_side_of_a_host_its_own() -> None:
     assert bus.generate(protocol("trio"), Options()) == {}
-    assert bus.generate(protocol("mc1231a"), Options(role="slave")) == {}
+    model = protocol("mc1231a")
+    device, host = (Options(role=role) for role in ("slave", "master"))
+    assert loaded(model, load(model, device), device).__all__ == ["Slave", "SlaveHandlers"]
+    made = loaded(model, load(model, host), host).__all__
+    assert made == sorted([*HOST_CALLERS, "AsyncAxis", "AsyncDevice", "Axis", "Device"])
+
+
+def test_without_a_command_that_selects_nothing_is_selected() -> None:
+    model, chosen = protocol("mc1231a"), Options(only=("get_kp", "get_status", "set_1"))
+    made = loaded(model, load(model, chosen), chosen)
+    assert made.__all__ == ["AsyncHostCalls", "HostCalls", "SlaveHandlers"]
 
 
 def test_a_side_and_commands_can_be_left_out() -> None:

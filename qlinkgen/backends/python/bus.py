@@ -24,17 +24,14 @@ from qlinkgen.model.fields import Value
 from qlinkgen.model.naming import file_stem, method, pascal
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line
-from qlinkgen.model.transaction import Command, Reply, Unknown
+from qlinkgen.model.transaction import Command, Reply, Selection, Unknown
 from qlinkgen.model.types import Enum
 from qlinkgen.plan import MessagePlan, Plan, plan_of
+from qlinkgen.plan.hosts import selection_of
 from qlinkgen.plan.payload import BytesStep, Holder, RecordsStep, RecordStep, by_slot
 
 __all__ = ["generate", "render"]
 
-#: Attribute for the axis that a command of a host acts on, and its values for which the axis must be
-#: selected. If it is unknown whether a command acts on an axis, selecting one is safe.
-_AXIS = "axis"
-_CHOSEN = ("current", "unknown")
 #: Who does not ask what the first and the second side of a link ask.
 _OTHERS = ("second", "first")
 
@@ -55,16 +52,17 @@ class Caller:
     name: str
     doc: list[str]
     prefix: str
-    #: Its objects represent one address or axis, and hold its number.
+    #: Its objects represent one address or what is selected, and hold its number.
     one: bool
     methods: list[Method]
-    #: Name of the argument that selects an axis, "" if there is none.
-    axis: str = ""
+    #: Name of the argument that selects what a command acts on, "" if there is none.
+    selected: str = ""
 
     @property
     def ask(self) -> list[str]:
-        """The signature of the method that sends a request for an axis."""
-        arguments = f"self, request: Message, response: type[_R], {self.axis}: int | None = None"
+        """The signature of the method by which a host sends a request, for what is selected."""
+        more = f", {self.selected}: int | None = None" if self.selected else ""
+        arguments = f"self, request: Request, response: type[_R]{more}"
         line = f"{self.prefix}def ask({arguments}) -> _R:"
         return (
             [line] if len(line) + 4 <= WIDTH else [f"{self.prefix}def ask(", f"    {arguments}", ") -> _R:"]
@@ -119,8 +117,7 @@ def render(plan: Plan) -> str:
 
 
 def _module(plan: Plan) -> BusModule | None:
-    bus = plan.protocol.bus
-    if bus.kind == "ring" or (bus.kind == "host" and plan.role == "slave"):
+    if plan.protocol.bus.kind == "ring":
         return None
     calls = [Transaction.of(plan, command) for command in plan.commands]
     kept = [call for call in calls if call is not None]
@@ -177,6 +174,8 @@ class BusView:
     callers: Sequence[Caller]
     servers: Sequence[Server]
     nodes: str
+    selects: str
+    host: bool
     others: bool
     #: Classes of collections.abc.
     abstract: Sequence[str]
@@ -198,14 +197,25 @@ class BusModule:
         self._sides = sides_of(plan.protocol, transactions)
         self._place: Place = place_of(plan)
         self._classes = {"Message"}
+        if plan.protocol.bus.kind == "host" and plan.role != "slave":
+            self._classes.add("Request")
 
     @cached_property
     def ports(self) -> Ports:
         """The modules with classes that open ports."""
         asks, answers = self._plan.role != "slave", self._plan.role != "master"
-        askers = [self._asker(side) for side in self._sides if side.asked] if asks else []
+        host = self._protocol.bus.kind == "host"
+        sides = [side for side in self._sides if side.asked] if asks else []
+        askers = [self._host_asker() if host else self._asker(side) for side in sides]
         slave = answers and any(side.answered for side in self._sides)
-        return Ports(self._plan, askers, slave=slave, nodes=self._nodes())
+        nodes = self._numbers if self._selected else self._nodes()
+        return Ports(self._plan, askers, slave=slave, nodes=nodes)
+
+    def _host_asker(self) -> Asker:
+        """The class of a device at a host, and that of one of what it selects."""
+        selected = self._selected
+        one = pascal(selected)
+        return Asker("Device", "HostCalls", one, f"{one}Calls" if one else "", host=True, selects=selected)
 
     def _asker(self, side: Side) -> Asker:
         """The classes of a side that open ports: those of a bus, or of a device if frames have no address."""
@@ -219,9 +229,10 @@ class BusModule:
         """The module's text."""
         host = self._protocol.bus.kind == "host"
         callers = self._callers(host=host) if self._plan.role != "slave" else []
-        servers = self._servers() if self._plan.role != "master" and not host else []
-        asker = "host" if host else "master"
-        titles = f"calls of a {asker}", "handlers of a slave"
+        servers = self._servers() if self._plan.role != "master" else []
+        titles = ("calls of a host", "handlers of a device")
+        if not host:
+            titles = "calls of a master", "handlers of a slave"
         if len(self._sides) > 1:
             titles = "calls of each side of a link", "its handlers"
         title = " and ".join(title for title, part in zip(titles, (callers, servers), strict=True) if part)
@@ -245,6 +256,8 @@ class BusModule:
             callers=callers,
             servers=servers,
             nodes=f", {self._nodes()}" if self._nodes() else "",
+            selects=self._selected,
+            host=host,
             others=any(each.done for each in self._transactions),
             abstract=self._abstract(callers=bool(callers), servers=bool(servers)),
             several=self._several,
@@ -461,40 +474,69 @@ class BusModule:
         nodes = self._protocol.bus.nodes
         return f"{nodes[0]}..{nodes[1]}" if nodes else ""
 
-    # Host of a device with or without axes
+    # Host of a device, whose commands may act on what is selected
+
+    @property
+    def _selection(self) -> Selection | None:
+        """What commands act on; None if nothing is selected."""
+        found = selection_of(self._plan)
+        return found if found and any(found.decides(each.command) for each in self._transactions) else None
+
+    @property
+    def _selected(self) -> str:
+        """The name of what commands act on, "" if nothing is selected."""
+        return self._selection.attribute if self._selection else ""
 
     def _host_callers(self, *, asynchronous: bool) -> list[Caller]:
-        on_axis = [each for each in self._transactions if _axis_of(each.command) in _CHOSEN]
-        fields = {held(each) for call in on_axis for each in call.request.payload.settable}
-        axis = "axis" if on_axis else ""
-        while axis in fields:
-            axis += "_"
-        host = self._host_caller("HostCalls", self._transactions, axis, asynchronous=asynchronous, one=False)
-        if not axis:
-            return [host]
-        return [host, self._host_caller("AxisCalls", on_axis, "", asynchronous=asynchronous, one=True)]
+        selection = self._selection
+        if selection is None:
+            calls = self._transactions
+            return [self._host_caller("HostCalls", calls, "", asynchronous=asynchronous, one=False)]
+        name, selected = attribute(selection.attribute), pascal(selection.attribute)
+        on_it = [each for each in self._transactions if selection.decides(each.command)]
+        fields = {held(each) for call in on_it for each in call.request.payload.settable}
+        while name in fields:
+            name += "_"
+        return [
+            self._host_caller("HostCalls", self._transactions, name, asynchronous=asynchronous, one=False),
+            self._host_caller(f"{selected}Calls", on_it, "", asynchronous=asynchronous, one=True),
+        ]
 
     def _host_caller(
-        self, name: str, calls: Sequence[Transaction], axis: str, *, asynchronous: bool, one: bool
+        self, name: str, calls: Sequence[Transaction], argument: str, *, asynchronous: bool, one: bool
     ) -> Caller:
-        what = "calls to one axis" if one else "calls of a host"
-        more = ["", "Attributes:", "    number: Number of the axis, from 1."] if one else []
+        selected, selection = self._selected, self._selection
+        what = f"calls to one {selected}" if one else "calls of a host"
+        more = ["", "Attributes:", f"    number: Number of the {selected}, {self._numbers}."] if one else []
         doc = _caller_doc(name, what, more, asynchronous=asynchronous)
         methods = [
             self._host_method(
-                each, axis if _axis_of(each.command) in _CHOSEN else "", asynchronous=asynchronous
+                each,
+                argument if selection and selection.decides(each.command) else "",
+                asynchronous=asynchronous,
             )
             for each in calls
         ]
-        return _make_caller(name, doc, methods, asynchronous=asynchronous, one=one, axis=axis)
+        return _make_caller(name, doc, methods, asynchronous=asynchronous, one=one, selected=argument)
 
-    def _host_method(self, call: Transaction, axis: str, *, asynchronous: bool) -> Method:
-        head = self._head(call, axis, self._answer(call, (), surely=True), asynchronous=asynchronous)
-        doc = [*_summary(call.command), *_attributes(call.command)]
+    @property
+    def _numbers(self) -> str:
+        """The numbers of what is selected."""
+        numbers = sorted(self._selection.commands) if self._selection else []
+        *others, last = map(str, numbers)
+        if len(numbers) > 2 and len(numbers) == numbers[-1] - numbers[0] + 1:
+            return f"{others[0]}..{last}"
+        return f"{', '.join(others)} or {last}" if others else last
+
+    def _host_method(self, call: Transaction, argument: str, *, asynchronous: bool) -> Method:
+        head = self._head(call, argument, self._answer(call, (), surely=True), asynchronous=asynchronous)
+        doc = [*_summary(call.command), *_attributes(call.command, self._selection)]
         if not asynchronous:
-            entry = f"{axis}: Axis to act on, from 1." if axis else ""
+            entry = (
+                f"{argument}: {self._selected.capitalize()} to act on, {self._numbers}." if argument else ""
+            )
             doc += self._arguments(call, entry)
-        wait, chosen = "await " if asynchronous else "", f", {axis}" if axis else ""
+        wait, chosen = "await " if asynchronous else "", f", {argument}" if argument else ""
         request = wrapped(f"_request = {self._class(call.request)}(", self._given(call), ")", 8)
         ask = f"{wait}self.tell(_request{chosen})"
         if call.response is not None:
@@ -507,12 +549,16 @@ class BusModule:
         """The name of a side of a link."""
         return self._protocol.bus.sides[self._sides.index(side)]
 
+    @property
+    def _answerer(self) -> str:
+        return "a device" if self._protocol.bus.kind == "host" else "a slave"
+
     def _servers(self) -> list[Server]:
         several = len(self._sides) > 1
         return [
             Server(
                 f"{side.answers}Handlers",
-                f"the {self._side(side)}" if several else "a slave",
+                f"the {self._side(side)}" if several else self._answerer,
                 f"_{self._side(side).upper()}_METHODS" if several else "_METHODS",
                 [f'{self._class(t.request)}: "{t.name}"' for t in side.answered],
                 [self._handler(call) for call in side.answered],
@@ -607,14 +653,9 @@ def _summary(command: Command) -> list[str]:
     return [*docstrings.paragraph(text, WIDTH - 12), *unconfirmed]
 
 
-def _axis_of(command: Command) -> str:
-    """The axis that a command acts on, "" in protocols without axes."""
-    return str(command.attributes.get(_AXIS, ""))
-
-
-def _attributes(command: Command) -> list[str]:
+def _attributes(command: Command, selection: Selection | None) -> list[str]:
     """The protocol-specific attributes of a command as a line; false ones are omitted."""
-    told = {(_AXIS, "current")}  # implied by the axis object or argument
+    told = {(selection.attribute, selection.values[0])} if selection else set()  # implied by the argument
     said = [pair for pair in command.attributes.items() if pair[1] is not False and pair not in told]
     words = [(key if value is True else f"{key} {value}").replace("_", " ") for key, value in said]
     return ["", *textwrap.wrap(one_line(f"{', '.join(words).capitalize()}."), WIDTH - 8)] if words else []
@@ -629,7 +670,7 @@ def _caller_doc(name: str, what: str, more: Sequence[str], *, asynchronous: bool
 
 
 def _make_caller(
-    name: str, doc: list[str], methods: list[Method], *, asynchronous: bool, one: bool, axis: str = ""
+    name: str, doc: list[str], methods: list[Method], *, asynchronous: bool, one: bool, selected: str = ""
 ) -> Caller:
     prefix = "async " if asynchronous else ""
-    return Caller(f"Async{name}" if asynchronous else name, doc, prefix, one, methods, axis)
+    return Caller(f"Async{name}" if asynchronous else name, doc, prefix, one, methods, selected)

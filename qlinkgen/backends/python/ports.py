@@ -14,12 +14,14 @@ from functools import cached_property
 from qlinkgen.backends import python_text
 from qlinkgen.backends.base import banner
 from qlinkgen.backends.python.layout import WIDTH
+from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.sections import templates
 from qlinkgen.model.naming import file_stem
 from qlinkgen.model.texts import one_line
 from qlinkgen.plan import Plan
 from qlinkgen.plan.ends import InStep
 from qlinkgen.plan.framing import frame_plan
+from qlinkgen.plan.hosts import host_of
 
 #: A byte that is sent to look for an echo, where receivers skip it.
 _PROBE = b"\0"
@@ -35,6 +37,8 @@ class Asker:
         node: name of the class of one node, "" without addresses.
         node_calls: name of its class of calls.
         both: the other side asks, too.
+        host: it is the device of a host.
+        selects: what its commands act on and select, "" for others; `node` is the class of one.
     """
 
     name: str
@@ -42,6 +46,18 @@ class Asker:
     node: str = ""
     node_calls: str = ""
     both: bool = False
+    host: bool = False
+    selects: str = ""
+
+    @property
+    def base(self) -> str:
+        """The class of qlinkgen that it is derived from."""
+        return "Link" if self.both else "Host" if self.host else "Bus"
+
+    @property
+    def node_base(self) -> str:
+        """The class of qlinkgen that the class of one node is derived from."""
+        return "Selected" if self.host else "Node"
 
 
 @dataclass(frozen=True)
@@ -54,6 +70,10 @@ class _View:
     doc: Sequence[str]
     node: str
     node_calls: str
+    node_base: str
+    #: The method that returns one node, and what it is.
+    method: str
+    what: str
     echo: str
 
 
@@ -71,7 +91,9 @@ class Ports:
         """
         self._protocol = plan.protocol
         frame = frame_plan(plan.protocol.frame)
-        driven = plan.protocol.bus.kind in {"master_slave", "link"} and not isinstance(frame.receiver, InStep)
+        in_step = isinstance(frame.receiver, InStep)
+        self._host = in_step and host_of(plan) is not None
+        driven = self._host or (plan.protocol.bus.kind in {"master_slave", "link"} and not in_step)
         self._askers = askers if driven else ()
         self._slave = slave and driven and not any(each.both for each in askers)
         self._nodes = nodes
@@ -96,7 +118,8 @@ class Ports:
     def _text(self, prefix: str) -> str:
         slave = self._slave and not prefix
         first, *others = banner(self._protocol)
-        what = "masters for asyncio" if prefix else "masters and slaves" if slave else "masters"
+        whom = ("hosts", "devices") if self._host else ("masters", "slaves")
+        what = f"{whom[0]} for asyncio" if prefix else " and ".join(whom) if slave else whom[0]
         head = one_line(f"{first}: {what} that open a port.")
         lines = [line for other in others for line in textwrap.wrap(one_line(other), WIDTH)]
         doc = python_text.docstring([*textwrap.wrap(head, WIDTH - 4), "", *lines])
@@ -112,31 +135,37 @@ class Ports:
                 nodes=self._nodes,
                 prefix=prefix,
                 slave=slave,
+                host=self._host,
             )
         )
 
     def _view(self, asker: Asker, prefix: str) -> _View:
-        what = "One side of the link" if asker.both else "The bus" if asker.node else "The device on a line"
+        bus = asker.node and not asker.host
+        what = "One side of the link" if asker.both else "The bus" if bus else "The device on a line"
         whom = "tasks of one event loop" if prefix else "threads"
         text = f"{what}, a method for each command, for any number of {whom}."
         return _View(
             name=prefix + asker.name,
-            base=f"{prefix}{'Link' if asker.both else 'Bus'}Base",
+            base=f"{prefix}{asker.base}Base",
             calls=prefix + asker.calls,
             doc=python_text.docstring(textwrap.wrap(text, WIDTH - 12)),
             node=asker.node and prefix + asker.node,
             node_calls=prefix + asker.node_calls,
-            echo="" if asker.both else self._echo,
+            node_base=f"{prefix}{asker.node_base}Base",
+            method=attribute(asker.selects) or "node",
+            what=asker.selects or "node",
+            echo=self._echo if asker.base == "Bus" else "",
         )
 
     def _imports(self, prefix: str) -> Iterator[str]:
-        module = "aio" if prefix else "blocking"
-        used = {"Link" if each.both else "Bus" for each in self._askers}
-        used |= {"Node" for each in self._askers if each.node}
-        for name in sorted(used):
-            yield f"from qlinkgen.bus.{module} import {prefix}{name} as {prefix}{name}Base"
+        module = ("host_aio" if prefix else "host") if self._host else "aio" if prefix else "blocking"
+        used = {each.base for each in self._askers}
+        used |= {each.node_base for each in self._askers if each.node}
+        imports = [f"from qlinkgen.bus.{module} import {prefix}{name} as {prefix}{name}Base" for name in used]
         if self._slave and not prefix:
-            yield "from qlinkgen.bus.slaves import Slave as SlaveBase"
+            answerer = "devices import DeviceSlave" if self._host else "slaves import Slave"
+            imports.append(f"from qlinkgen.bus.{answerer} as SlaveBase")
+        yield from sorted(imports)
         yield ""
         yield f"from . import {self._codec}"
         calls = {

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from qlinkgen.bus.options import Checksum
 from qlinkgen.protocols.clients import asyncio_clients
 from qlinkgen.protocols.mc1231a.chip import ChipSet
-from qlinkgen.protocols.mc1231a.chip_engine import ChipCounters, ChipEngine
+from qlinkgen.protocols.mc1231a.chip_engine import ChipEngine
 from qlinkgen.protocols.mc1231a.host import Axis, Host
-from qlinkgen.protocols.mc1231a.usage import Checksum, UnconfirmedCommand
+from qlinkgen.protocols.mc1231a.usage import UnconfirmedCommand
 
 if TYPE_CHECKING:
     from qlinkgen.protocols.mc1231a.aio import AsyncAxis, AsyncHost
@@ -22,7 +23,6 @@ __all__ = [
     "AsyncHost",
     "Axis",
     "Checksum",
-    "ChipCounters",
     "ChipEngine",
     "ChipSet",
     "Host",

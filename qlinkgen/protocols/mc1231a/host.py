@@ -5,24 +5,23 @@ Derived from `aio.py` by `python -m tests.unasync`: change that one, and run it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeVar
+from typing import Self, TypeVar, Unpack
 
+from qlinkgen.bus.host import Selected
+from qlinkgen.bus.making import open_line
+from qlinkgen.bus.options import HostOptions
 from qlinkgen.codecs import mc1231a
-from qlinkgen.codecs.mc1231a_bus import AxisCalls, HostCalls
-from qlinkgen.link.events import Event
-from qlinkgen.link.host import HostEngine
+from qlinkgen.codecs.mc1231a_bus import AxisCalls, Device
+from qlinkgen.link.codec import Framed
 from qlinkgen.protocols.mc1231a import updating
-from qlinkgen.protocols.mc1231a.facts import SELECT, check_axis
-from qlinkgen.protocols.mc1231a.usage import Checksum, Usage, make_engine, packet
-from qlinkgen.transport.blocking import BlockingMaster
-from qlinkgen.transport.opening import closing_on_error, open_port
+from qlinkgen.protocols.mc1231a.usage import Usage
+from qlinkgen.transport.opening import closing_on_error
 from qlinkgen.transport.port import Port
 
-R = TypeVar("R", bound=mc1231a.Message)
+R = TypeVar("R")
 
 
-class Host(BlockingMaster, HostCalls):
+class Host(Device):
     """The host of a chip set, for any number of threads.
 
     Every command of the table is a method; those that act on the current axis take the axis as their first
@@ -39,85 +38,40 @@ class Host(BlockingMaster, HostCalls):
         command_errors: update and multi_update check for the command error by default.
     """
 
-    engine: HostEngine
-
-    def __init__(
-        self,
-        port: Port,
-        *,
-        checksum: Checksum = "always",
-        attempts: int = 3,
-        command_errors: bool = False,
-        forgets: float = 0.0,
-        slack: float | None = None,
-        on_event: Callable[[Event], None] | None = None,
-    ) -> None:
+    def __init__(self, port: Port, *, command_errors: bool = False, **options: Unpack[HostOptions]) -> None:
         """Take ownership of a port; closing the host closes it.
 
         Args:
             port: the port of the chip set.
-            checksum: commands whose checksum is read: "always", "never", or names. Without it, the loss or
-                corruption of a packet is not detected.
-            attempts: most transmissions of a packet, the first included; packets that are unsafe to repeat
-                are sent once.
             command_errors: update and multi_update also read the status word, and raise CommandError.
-            forgets: seconds of silence after which the chip's side of the link discards an incomplete packet;
-                0 if it never does.
-            slack: largest delay in seconds that driver, adapter and operating system add to a transaction; by
-                default derived from the port.
-            on_event: called with each event, in the calling thread.
+            options: those of any host, in `qlinkgen.bus.options`.
         """
-        engine = make_engine(port, checksum=checksum, attempts=attempts, slack=slack, forgets=forgets)
-        super().__init__(engine, port, on_event=on_event)
+        super().__init__(port, **options)
         self.command_errors = command_errors
         self.usage = Usage()
 
     @classmethod
-    def open(
-        cls,
-        name: str,
-        *,
-        baud: int,
-        checksum: Checksum = "always",
-        attempts: int = 3,
-        command_errors: bool = False,
-        forgets: float = 0.0,
-        slack: float | None = None,
-        on_event: Callable[[Event], None] | None = None,
-    ) -> Host:
-        """Open a device name or a URL of pyserial; the sources state no speed. The rest as for the class.
+    def open(  # type: ignore[override]  # the sources state no speed
+        cls, name: str, *, baud: int, command_errors: bool = False, **options: Unpack[HostOptions]
+    ) -> Self:
+        """Open a device name or a URL of pyserial; the rest as for the class.
 
         Raises:
             PortMissing: the port does not exist.
             PortBusy: another program uses it, or this user lacks the permission.
         """
-        with closing_on_error(open_port(name, baud=baud)) as port:
-            return cls(
-                port,
-                checksum=checksum,
-                attempts=attempts,
-                command_errors=command_errors,
-                forgets=forgets,
-                slack=slack,
-                on_event=on_event,
-            )
+        opened = open_line(mc1231a, name, baud=baud, parity="none", stop_bits=1, reopen=False)
+        with closing_on_error(opened) as port:
+            return cls(port, command_errors=command_errors, **options)
 
-    def axis(self, number: int) -> Axis:
+    def axis(self, number: int) -> Axis:  # type: ignore[override]  # with its own update
         """Return one axis, 1 or 2."""
         return Axis(self, number)
 
-    def ask(
-        self,
-        request: mc1231a.Message,
-        response: type[R],  # noqa: ARG002  # for type checkers
-        axis: int | None = None,
-    ) -> R:
+    def ask(self, request: Framed, response: type[R], axis: int | None = None) -> R:
         """Send a packet, for an axis if one is given, and return its answer."""
         self.usage.note(request)
-        context = None if axis is None else SELECT[check_axis(axis)]
-        reply = self.transact(packet(request, context))
-        answer: R = reply.response
-        return answer
+        return super().ask(request, response, axis)
 
     def raise_command_error(self, axis: int) -> int:
         """Read the status word of an axis and return it.
@@ -147,7 +101,7 @@ class Host(BlockingMaster, HostCalls):
         return self.run(updating.multi_update(axes, check=self.command_errors if check is None else check))
 
 
-class Axis(AxisCalls):
+class Axis(Selected[Host], AxisCalls):
     """One axis: every command that acts on the current axis, without the axis argument.
 
     Attributes:
@@ -155,17 +109,10 @@ class Axis(AxisCalls):
         number: 1 or 2.
     """
 
-    def __init__(self, host: Host, number: int) -> None:
-        self.host = host
-        self.number = check_axis(number)
-        self._context = SELECT[number]
-
-    def ask(self, request: mc1231a.Message, response: type[R]) -> R:  # noqa: ARG002  # for type checkers
+    def ask(self, request: Framed, response: type[R]) -> R:
         """Send a packet for this axis and return its answer."""
         self.host.usage.note(request)
-        reply = self.host.transact(packet(request, self._context))
-        answer: R = reply.response
-        return answer
+        return Device.ask(self.host, request, response, self.number)
 
     def raise_command_error(self) -> int:
         """As `Host.raise_command_error`."""
