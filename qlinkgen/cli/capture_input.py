@@ -86,9 +86,20 @@ class Capture:
     def frames(self, name: str) -> Iterator[Placed]:
         """Return the frames of a file, or of standard input for -."""
         with _opened(name, self.problems) as file:
-            chosen = _choose(self._protocol, file, self._readers(file, live=name == "-"), self._decoder)
+            chosen = self._chosen(file, live=name == "-")
             traffic = self._decoder.traffic(chosen.sides, exact=chosen.reader.exact)
-            yield from traffic.decode(map(self._counted, chosen.reader.read(file, self.problems)))
+            yield from traffic.decode(self._read(chosen, file))
+
+    def records(self, name: str) -> Iterator[Record]:
+        """Return the bytes of a file as they were captured."""
+        with _opened(name, self.problems) as file:
+            yield from self._read(self._chosen(file, live=False), file)
+
+    def _chosen(self, file: io.BufferedReader, *, live: bool) -> _Chosen:
+        return _choose(self._protocol, file, self._readers(file, live=live), self._decoder)
+
+    def _read(self, chosen: _Chosen, file: io.BufferedReader) -> Iterator[Record]:
+        return map(self._counted, chosen.reader.read(file, self.problems))
 
     def _counted(self, record: Record) -> Record:
         self.size += len(record.data)

@@ -113,6 +113,11 @@ class Filter:
         self._flags = Flagged(protocol)
         self._condition = None if wanted.where is None else _condition(protocol, wanted.where)
 
+    @property
+    def chooses(self) -> bool:
+        """Whether anything is left out."""
+        return self._wanted != FilterOptions()
+
     def keeps(self, record: Mapping[str, Json]) -> bool:
         """Whether the user wants to see an object."""
         wanted = self._wanted

@@ -1,0 +1,159 @@
+"""`qlinkgen stats`: figures of captures whose traffic is known."""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from qlinkgen.captures.statistics import Histogram, Load
+from qlinkgen.codecs import qlink
+from tests.captures.written import EVERY, START, Burst
+from tests.cli.conftest import Run
+
+MILLI = 10**6
+
+
+def traffic() -> list[Burst]:
+    """Return 100 transactions with node 3: answers after 3 ms, one after 50 ms, one missing, one bad."""
+    found, at = [], START
+    for index in range(100):
+        request = qlink.MotionRequest(node=3, counter=index).to_frame()
+        answer = qlink.MotionResponse(node=3, counter=index, position=index).to_frame()
+        found.append(Burst(request, at, "sent"))
+        if index == 10:  # no answer: the request is repeated
+            found.append(Burst(request, at + 60 * MILLI, "sent"))
+            at += 60 * MILLI
+        if index == 20:
+            answer = answer[:-1] + bytes([answer[-1] ^ 1])
+        delay = 50 if index == 30 else 3
+        found.append(Burst(answer, at + delay * MILLI, "received"))
+        at += 100 * MILLI
+    return found
+
+
+@pytest.fixture
+def capture(tmp_path: Path) -> Path:
+    file = tmp_path / "line.pcapng"
+    file.write_bytes(EVERY["pcapng"][1](traffic()))
+    return file
+
+
+def figures(qlinkgen: Run, *arguments: str | Path, code: int = 0) -> dict[str, Any]:
+    done = qlinkgen("stats", "qlink", "--format", "json", *arguments)
+    assert done.code == code, done.err
+    found: dict[str, Any] = json.loads(done.out)
+    return found
+
+
+def test_figures(qlinkgen: Run, capture: Path) -> None:
+    found = figures(qlinkgen, capture)
+    bursts = traffic()
+    size = sum(len(each.data) for each in bursts)
+    assert (found["frames"], found["bytes"], found["outside"]) == (200, size, 0)
+    assert found["faults"] == {"crc": 1}
+    assert found["seconds"] == pytest.approx(9.963)
+    assert found["utilisation"] == pytest.approx(size * 10 / 115200 / 9.963)
+    (row,) = found["rows"]
+    counts = ("node", "name", "requests", "repeats", "responses", "late", "unanswered", "strays", "messages")
+    assert [row[each] for each in counts] == [3, "motion", 101, 1, 99, 1, 3, 0, 0]
+    times = row["times"]
+    assert times["count"] == 99
+    assert times["median"] == pytest.approx(0.003, rel=0.03)
+    assert times["most"] == pytest.approx(0.05)
+    assert sum(count for _, _, count in times["histogram"]) == 99
+
+
+def test_text_and_page(qlinkgen: Run, capture: Path, tmp_path: Path) -> None:
+    text = qlinkgen("stats", "qlink", capture)
+    assert re.search(r"^ *3 +motion +101 +1 +99 +1 +3 +3\.0\d +\S+ +50\.00$", text.out, re.MULTILINE)
+    assert "bad frames: crc 1" in text.out
+    assert re.search(r"^ *3 +1$", text.out, re.MULTILINE)  # the node whose answer was damaged
+    page = tmp_path / "page.html"
+    done = qlinkgen("stats", "qlink", capture, "--format", "html", "-o", page)
+    assert "wrote" in done.err
+    html = page.read_text("utf-8")
+    assert html.count("<svg") == 2
+    assert "Response times of motion, node 3" in html
+    assert not re.search(r"(src|href)=|@import|url\(", html)
+    plain = tmp_path / "text"
+    assert qlinkgen("stats", "qlink", capture, "-o", plain).code == 0
+    assert "bad frames: crc 1" in plain.read_text("utf-8")
+
+
+def test_names_of_files_are_not_markup(qlinkgen: Run, capture: Path, tmp_path: Path) -> None:
+    file = tmp_path / "<script>alert(1)<script>"
+    file.write_bytes(capture.read_bytes())
+    assert "<script>" not in qlinkgen("stats", "qlink", file, "--format", "html").out
+
+
+def test_filters_and_several_files(qlinkgen: Run, capture: Path) -> None:
+    assert figures(qlinkgen, capture, capture)["frames"] == 400
+    some = figures(qlinkgen, capture, "--message", "motion.request")
+    assert (some["frames"], some["outside"]) == (101, None)
+    assert figures(qlinkgen, capture, "--node", "4", code=1)["frames"] == 0
+    assert figures(qlinkgen, capture, "--strict", code=1)["frames"] == 200
+
+
+def test_captures_without_times(qlinkgen: Run, tmp_path: Path) -> None:
+    file = tmp_path / "line.bin"
+    file.write_bytes(b"".join(each.data for each in traffic()))
+    found = figures(qlinkgen, file)
+    assert (found["frames"], found["seconds"], found["utilisation"]) == (200, None, None)
+    (row,) = found["rows"]
+    assert (row["requests"], row["responses"], "times" in row) == (101, 99, False)
+
+
+def test_a_ring_and_a_host(qlinkgen: Run, tmp_path: Path) -> None:
+    file = tmp_path / "log"
+    file.write_text("0.1 TX 94 7f 90\n0.4 TX 94 7f 90\n")
+    found = json.loads(qlinkgen("stats", "trio", "--format", "json", file).out)
+    assert [(row["name"], row["address"], row["messages"]) for row in found["rows"]] == [
+        ("keypad_mode", 2, 2)
+    ]
+    file.write_text("0.1 TX 4a\n0.104 RX 0012d687d6e3\n0.2 TX 4a\n")
+    found = json.loads(qlinkgen("stats", "mc1231a", "--format", "json", file).out)
+    (row,) = found["rows"]
+    assert (row["name"], row["requests"], row["responses"]) == ("get_pos", 2, 1)
+    assert row["times"]["most"] == pytest.approx(0.004)
+
+
+def test_refusals(qlinkgen: Run, tmp_path: Path) -> None:
+    file = tmp_path / "log"
+    wire = qlinkgen("encode", "modbus_rtu", "read_coils", "--node", "17", "start=0", "quantity=3").out
+    refused = qlinkgen("encode", "modbus_rtu", "read_coils.exception", "--node", "17", "code=2")
+    assert refused.code == 0, refused.err
+    file.write_text(f"0.1 TX {wire.strip()}\n0.12 RX {refused.out}")
+    found = json.loads(qlinkgen("stats", "modbus_rtu", "--format", "json", file).out)
+    (row,) = found["rows"]
+    assert (row["responses"], row["refused"], row["unanswered"]) == (1, 1, 0)
+
+
+def test_quantiles() -> None:
+    chance = random.Random(1)
+    times = [10 ** chance.uniform(-5, 2) for _ in range(5000)]
+    histogram = Histogram()
+    for each in times:
+        histogram.add(each)
+    times.sort()
+    for part in (0.01, 0.5, 0.9, 0.99):
+        assert histogram.quantile(part) == pytest.approx(times[int(part * len(times)) - 1], rel=0.03)
+    assert histogram.quantile(1.0) == times[-1]
+    assert histogram.mean() == pytest.approx(sum(times) / len(times))
+    assert sum(count for _, _, count in histogram.bars(7)) == 5000
+    assert len(list(histogram.bars(7))) <= 7
+    assert (Histogram().quantile(0.5), list(Histogram().bars(5))) == (0.0, [])
+
+
+def test_load_over_any_time() -> None:
+    load = Load()
+    for at in (START, START + 5, START + 3600 * 10**9, START - 9):
+        load.add(at, 10)
+    assert sum(load.bytes()) == 40
+    assert load.bytes()[0] == 30
+    assert len(load.bytes()) <= 240
+    assert load.piece * len(load.bytes()) >= 3600 * 10**9
