@@ -355,7 +355,7 @@ def test_values_of_every_frame_are_keys_beside_the_address(tmp_path: Path) -> No
     line = ran("decode", path, "--direction", "request", wire)
     assert json.loads(line) == {
         "message": "set.request", "node": 3, "signed": True, "level": 3, "component": "all", "trim": -1.5,
-        "fields": {"value": 7},
+        "fields": {"value": 7}, "offset": 0,
     }  # fmt: skip
     assert ran("encode", path, "--json", line) == wire
     assert ".level      3" in ran("explain", path, wire)
