@@ -36,8 +36,9 @@ _DIGITS = re.compile(rb"(?:[0-9a-fA-FxX\s]|#[^\n]*\n?)*")
 #: Bytes with which the format is detected: as they are in the file, and of the line.
 _HEAD = 1 << 16
 _SAMPLE = 1 << 13
-#: Directions that a capture states are taken unless the frames are as many times more without them.
-_STATED = 2
+#: A likelier format, and the directions that a capture states, are taken unless there are as many times more
+#: bytes in frames without them: of some protocols, most bytes are frames.
+_CLEARLY = 2
 #: Records of which the directions are detected.
 _RECORDS = 4000
 
@@ -133,11 +134,11 @@ def _choose(
 ) -> _Chosen:
     """Return how a capture is read: with the reader and directions that give most bytes in frames.
 
-    Of readers that give as many, the first one is taken; of the file, nothing.
+    A likelier reader is taken unless another one gives clearly more. Of the file, nothing is taken.
     """
     head = file.peek(_HEAD)
     best: _Chosen | None = None
-    most = -1.0
+    most = 0.0
     for reader in readers:
         records = _sample(reader.read(io.BytesIO(head), Problems()))
         sources = list(dict.fromkeys(map(source_of, records)))
@@ -145,8 +146,8 @@ def _choose(
             (_covered(decoder.traffic(sides, exact=reader.exact), records), sides)
             for sides in sides_of(sources, protocol)
         ]
-        covered, sides = max(every, key=lambda found: found[0] * (_STATED if found[1] else 1))
-        if covered > most:
+        covered, sides = max(every, key=lambda found: found[0] * (_CLEARLY if found[1] else 1))
+        if best is None or covered > most * _CLEARLY:
             best, most = _Chosen(reader, sides), covered
     assert best is not None  # there is a reader
     return best

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import click
 
-from qlinkgen.captures.records import FORMATS, Format
+from qlinkgen.captures.records import FORMATS, Format, Problems
 from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.common import is_hex, parse_hex, warn
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +48,44 @@ def capture_options(command: Callable[..., int]) -> Callable[..., int]:
     for option in reversed(_OPTIONS):
         option(wrapped)
     return wrapped
+
+
+def given_bytes(words: Sequence[str], *, raw: bool = False) -> bytes | None:
+    """Return the bytes of arguments that are HEX, None if they are files, or none for standard input.
+
+    Raises:
+        Failure: they are neither, or both.
+    """
+    files = [each for each in words if not is_hex(each) and (each == "-" or _is_file(each))]
+    if words and not files:
+        if raw:
+            raise Failure("raw bytes are those of a file or of standard input; omit HEX, --raw and raw")
+        return parse_hex(" ".join(words))
+    for each in words:
+        if each not in files:
+            raise Failure(f"'{each}' is not a file; write either HEX or the names of files")
+    if words.count("-") > 1:
+        raise Failure("- is standard input, which is read once; name it once")
+    if not words and sys.stdin.isatty():
+        raise Failure("nothing to decode; give HEX or FILE, or - to read standard input")
+    return None
+
+
+def _is_file(name: str) -> bool:
+    try:
+        return Path(name).exists()
+    except (OSError, ValueError):  # too long for a name, or with a zero
+        return False
+
+
+def complain(file: str, problems: Problems) -> None:
+    """Say what could not be read of a file."""
+    name = "standard input" if file == "-" else file
+    for each in problems.kept:
+        where = f"line {each.line}" if each.line else f"offset {each.offset}"
+        warn(f"{name}, {where}: {each.text}")
+    if more := problems.count - len(problems.kept):
+        warn(f"{name}: {more} further places could not be read")
 
 
 _OPTIONS = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Protocol as TypingProtocol
 from typing import cast
@@ -11,6 +11,7 @@ from typing import cast
 from qlinkgen.cli.codec import MessageObject
 from qlinkgen.cli.streams import Bad, Event, OneWay
 from qlinkgen.link.codec import Message
+from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import Plan, plan_of
 
@@ -47,6 +48,12 @@ class Conversation:
         self._offset = 0
         self._asked: Asked | None = None
         self._waiting = bytearray()
+        self._way: Direction | None = None
+        self._answered = 0  # bytes of answers so far, which the decoder of requests does not see
+
+    def hear(self, way: Direction | None) -> None:
+        """State the direction of the bytes that follow, None if it is not known."""
+        self._way = way
 
     def feed(self, data: bytes) -> Iterator[Event]:
         """Take bytes."""
@@ -56,22 +63,34 @@ class Conversation:
     def finish(self) -> Iterator[Event]:
         """End the stream: bytes held back as a possible response may be requests."""
         yield from self._settle(last=True)
-        yield from self._requests.finish()
+        yield from map(self._placed, self._requests.finish())
 
     def _settle(self, *, last: bool) -> Iterator[Event]:
         while self._waiting:
+            if self._asked is None and self._way == "response":
+                yield self._stray()
+                continue
             if self._asked is None:
                 yield from self._request(self._take(1))
                 continue
             size = answer_size(self._plan, self._asked)
-            if len(self._waiting) < size and not last:
+            if len(self._waiting) < size and not last and self._way != "request":
                 return
             asked, self._asked = self._asked, None
+            if self._way == "request":
+                continue  # the request was not answered
             if size and len(self._waiting) >= size:
                 found = decode_answer(self._codec, bytes(self._waiting[:size]), asked, self._offset)
-                if self._is_answer(found, asked):
+                if self._way == "response" or self._is_answer(found, asked):
                     self._take(size)
+                    self._answered += size
                     yield found
+
+    def _stray(self) -> Bad:
+        """Return the bytes of the device that answer nothing."""
+        offset, size = self._offset, len(self._waiting)
+        self._answered += size
+        return Bad("unknown", offset, self._take(size), "a response without a request")
 
     def _take(self, size: int) -> bytes:
         taken = bytes(self._waiting[:size])
@@ -80,9 +99,12 @@ class Conversation:
         return taken
 
     def _request(self, byte: bytes) -> Iterator[Event]:
-        for event in self._requests.feed(byte):
+        for event in map(self._placed, self._requests.feed(byte)):
             self._asked = self._out_of_range(event) if isinstance(event, Bad) else event
             yield event
+
+    def _placed(self, event: Event) -> Event:
+        return replace(event, offset=event.offset + self._answered) if isinstance(event, Bad) else event
 
     def _out_of_range(self, bad: Bad) -> OutOfRange | None:
         if bad.kind != "range" or bad.raw[0] not in self._names:

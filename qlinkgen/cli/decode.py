@@ -7,22 +7,19 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 from decimal import Decimal
-from pathlib import Path
 
 import click
 
 from qlinkgen.captures.records import Problems, Record
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.arguments import protocol_argument
-from qlinkgen.cli.boundary import FINE, WRONG, Failure
-from qlinkgen.cli.capture_options import CaptureOptions, capture_options
+from qlinkgen.cli.boundary import FINE, WRONG
+from qlinkgen.cli.capture_options import CaptureOptions, capture_options, complain, given_bytes
 from qlinkgen.cli.codec import fields, load_codec
 from qlinkgen.cli.common import (
     crc_option,
     find_message,
-    is_hex,
     load_protocol,
-    parse_hex,
     version_option,
     warn,
     warn_unconfirmed,
@@ -102,20 +99,21 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen decode trio --raw < /dev/ttyUSB0
     qlinkgen decode mc1231a --direction response --request 4a 0012d687d6e3
     """  # noqa: D301  # click takes the character \b for "do not wrap"
-    given = _given(hex_, capture)
+    given = given_bytes(hex_, raw=capture.format == "raw")
+    files = hex_ or ("-",)
     loaded = load_protocol(protocol, crc, version)
     codec = load_codec(loaded, plain=crc is None)
     turned, wanted = _turned(loaded, wanted)
     decoder = Decoder(loaded, codec, direction, request, turned, capture.baud)
-    several = not isinstance(given, bytes) and len(given) > 1
+    several = given is None and len(files) > 1
     printer = _Printer(loaded, Filter(loaded, wanted), several=several, flags=flags)
-    if isinstance(given, bytes):
+    if given is not None:
         printer.show(decoder.traffic({}, exact=True).decode([Record(given, 0)]))
         return printer.result(len(given), strict=True)
     from qlinkgen.cli.capture_input import Capture  # noqa: PLC0415  # not needed for HEX
 
     size = 0
-    for path in given:
+    for path in files:
         file = Capture(loaded, decoder, capture)
         printer.show(file.frames(path), path)
         printer.complain(path, file.problems)
@@ -124,36 +122,12 @@ def command(  # noqa: PLR0917  # click passes them by name
     return printer.result(size, strict=strict)
 
 
-def _given(words: tuple[str, ...], capture: CaptureOptions) -> bytes | tuple[str, ...]:
-    """Return the bytes, or the names of files."""
-    files = [each for each in words if not is_hex(each) and (each == "-" or _is_file(each))]
-    if words and not files:
-        if capture.format == "raw":
-            raise Failure("raw bytes are those of a file or of standard input; omit HEX, --raw and raw")
-        return parse_hex(" ".join(words))
-    for each in words:
-        if each not in files:
-            raise Failure(f"'{each}' is not a file; write either HEX or the names of files")
-    if words.count("-") > 1:
-        raise Failure("- is standard input, which is read once; name it once")
-    if not words and sys.stdin.isatty():
-        raise Failure("nothing to decode; give HEX or FILE, or - to read standard input")
-    return words or ("-",)
-
-
 def _turned(protocol: Protocol, wanted: FilterOptions) -> tuple[str | None, FilterOptions]:
     """Return the message that all bytes are, if only its turn tells it; then messages are not chosen."""
     if len(wanted.messages) != 1:
         return None, wanted
     message = find_message(protocol, wanted.messages[0])
     return (message.name, replace(wanted, messages=())) if protocol.is_turned(message) else (None, wanted)
-
-
-def _is_file(name: str) -> bool:
-    try:
-        return Path(name).exists()
-    except (OSError, ValueError):  # too long for a name, or with a zero
-        return False
 
 
 class _Printer:
@@ -185,12 +159,7 @@ class _Printer:
 
     def complain(self, file: str, problems: Problems) -> None:
         """Say what could not be read of a file."""
-        name = "standard input" if file == "-" else file
-        for each in problems.kept:
-            where = f"line {each.line}" if each.line else f"offset {each.offset}"
-            warn(f"{name}, {where}: {each.text}")
-        if more := problems.count - len(problems.kept):
-            warn(f"{name}: {more} further places could not be read")
+        complain(file, problems)
         self._unread += problems.count
 
     def summarise(self, size: int) -> None:

@@ -46,7 +46,8 @@ class Decoder:
             return Lane(stream, exact=exact, wire=lambda found: found.to_bytes())
         if frame_plan(protocol.frame).needs_request and self._direction != "request":
             if self._direction is None and request is None:
-                return Lane(Conversation(protocol, codec), exact=exact, wire=PacketWire(protocol))
+                both = Conversation(protocol, codec)
+                return Lane(both, exact=exact, wire=PacketWire(protocol), hear=both.hear)
             told = asked(protocol, codec, request)
             return Lane(Answers(protocol, codec, told), exact=exact, wire=PacketWire(protocol, told))
         if self._direction and self._direction not in protocol.directions:

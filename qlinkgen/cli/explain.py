@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from types import ModuleType
 
 import click
 
 from qlinkgen.cli.arguments import protocol_argument
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
+from qlinkgen.cli.capture_options import CaptureOptions, capture_options, given_bytes
 from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import (
     crc_option,
@@ -23,6 +25,7 @@ from qlinkgen.cli.span_text import value_of
 from qlinkgen.cli.streams import PROGRESS
 from qlinkgen.cli.tables import Table, heading, paragraph
 from qlinkgen.model.message import Direction
+from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.replacement import Replacement
 from qlinkgen.model.texts import one_line
 from qlinkgen.plan import Plan, plan_of
@@ -35,7 +38,8 @@ Line = tuple[int, str, str, str, bool]
 
 @click.command("explain")
 @protocol_argument
-@click.argument("hex_", metavar="HEX...", nargs=-1, required=True)
+@click.argument("hex_", metavar="HEX...|FILE|-", nargs=-1, required=True)
+@click.option("--first-bad", is_flag=True, help="Explain the first bad frame of a capture.")
 @click.option(
     "--direction",
     type=click.Choice(["request", "response"]),
@@ -48,14 +52,17 @@ Line = tuple[int, str, str, str, bool]
     help="The request of a response that depends on it; HEX is then only the response.",
 )
 @click.option("--message", "name", metavar="MESSAGE", help="What HEX is, where only its turn tells it.")
+@capture_options
 @crc_option
 @version_option
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
     hex_: tuple[str, ...],
+    first_bad: bool,
     direction: Direction | None,
     request: str | None,
     name: str | None,
+    capture: CaptureOptions,
     crc: Replacement | None,
     version: str | None,
 ) -> int:
@@ -64,13 +71,22 @@ def command(  # noqa: PLR0917  # click passes them by name
     For a wrong checksum, the other algorithms of the catalogue, byte orders and coverages are tried. Exit
     code 1 if there is an error.
 
+    With --first-bad, the first bad frame of a capture as of decode. Of two captures, the first frame in which
+    they differ, as both have it.
+
     \b
     qlinkgen explain qlink a5a50783 01a500ffa500e305
     qlinkgen explain mc1231a 4a 0012d687d6e3
+    qlinkgen explain qlink line.pcapng --first-bad
+    qlinkgen explain qlink yesterday.log today.log
     qlinkgen explain stm32 --message read_memory.place 0800000008
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc, version)
-    data = parse_hex(" ".join(hex_))
+    data = given_bytes(hex_, raw=capture.format == "raw")
+    if data is None:
+        return _of_files(loaded, load_codec(loaded, plain=crc is None), hex_, capture, first_bad=first_bad)
+    if first_bad:
+        raise Failure("--first-bad looks for a frame in a capture; name a FILE, or omit the option")
     if not data:
         raise Failure("HEX is empty; give the bytes of one frame")
     asked = None if request is None else parse_hex(request, "--request")
@@ -84,6 +100,31 @@ def command(  # noqa: PLR0917  # click passes them by name
         found, hints = explained(plan, data, direction, asked)
     _show(found, hints)
     return WRONG if any(each.kind for each in found) else FINE
+
+
+def _of_files(
+    protocol: Protocol, codec: ModuleType, names: tuple[str, ...], capture: CaptureOptions, *, first_bad: bool
+) -> int:
+    """Explain the first bad frame of a capture, or the first difference of two."""
+    if len(names) > 2 or (len(names) == 1) is not first_bad:
+        raise Failure("explain takes HEX, a FILE with --first-bad, or two FILEs without it")
+    from qlinkgen.cli import explain_files as files  # noqa: PLC0415  # not needed for HEX
+
+    frames = [files.Frames(protocol, codec, capture, name) for name in names]
+    found: tuple[files.Found | None, ...] | None
+    found = (files.first_bad(frames[0]),) if first_bad else files.first_difference(*frames)
+    if found is None or found == (None,):
+        what = "no bad frame among" if first_bad else "no difference in"
+        click.echo(f"{what} {frames[0].count} frames")
+        return FINE if frames[0].count else WRONG
+    for name, each in zip(names, found, strict=True):
+        if each is None:
+            click.echo(f"{name}: it has no more frames\n")
+            continue
+        click.echo(each.text)
+        _show(*explained(plan_of(protocol), each.data, each.direction, each.request))
+        click.echo()
+    return WRONG
 
 
 def explained(

@@ -15,9 +15,9 @@ from qlinkgen.captures.statistics import Seen, Statistics
 from qlinkgen.cli.arguments import protocol_argument
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.capture_input import Capture
-from qlinkgen.cli.capture_options import CaptureOptions, capture_options
+from qlinkgen.cli.capture_options import CaptureOptions, capture_options, complain
 from qlinkgen.cli.codec import load_codec
-from qlinkgen.cli.common import load_protocol, version_option, warn
+from qlinkgen.cli.common import load_protocol, version_option
 from qlinkgen.cli.decoder import Decoder
 from qlinkgen.cli.filters import Filter, FilterOptions, filter_options
 from qlinkgen.cli.stats_report import Report, html, show
@@ -71,9 +71,7 @@ def command(  # noqa: PLR0917  # click passes them by name
             statistics.take(seen)
         size += file.size
         problems.count += file.problems.count
-        for each in file.problems.kept:
-            where = f"line {each.line}" if each.line else f"offset {each.offset}"
-            warn(f"{name}, {where}: {each.text}")
+        complain(name, file.problems)
     report = Report.of(loaded, statistics, None if chosen.chooses else size, baud)
     if form == "text" and output is None:
         show(report)

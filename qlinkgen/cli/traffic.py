@@ -73,8 +73,23 @@ def framed(message: MessageObject) -> bytes:
 class Lane:
     """A stream of bytes of which each event has a place."""
 
-    def __init__(self, stream: Stream, *, exact: bool, wire: Wire = framed) -> None:
-        """`exact`: the offset of a record is that of its bytes, not of a packet or a line."""
+    def __init__(
+        self,
+        stream: Stream,
+        *,
+        exact: bool,
+        wire: Wire = framed,
+        hear: Callable[[Direction | None], None] | None = None,
+    ) -> None:
+        """Take the events of a stream.
+
+        Args:
+            stream: decodes the bytes.
+            exact: the offset of a record is that of its bytes, not of a packet or a line.
+            wire: gives the bytes of a message.
+            hear: is told the direction of the bytes that follow.
+        """
+        self.hear = hear
         self._stream = stream
         self._wire = wire
         self._exact = exact
@@ -187,9 +202,11 @@ class Traffic:
         return [self._alone] if self._alone else [*self._lanes.values()]
 
     def _lane(self, record: Record) -> Lane:
-        if self._alone is not None:
-            return self._alone
         way = self._sides.get(source_of(record))
+        if self._alone is not None:
+            if self._alone.hear is not None:
+                self._alone.hear(way)
+            return self._alone
         key = ("" if way else record.port, way)
         lane = self._lanes.get(key)
         if lane is None:

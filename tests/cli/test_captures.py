@@ -250,3 +250,56 @@ def test_a_recording_of_another_program(qlinkgen: Run, tmp_path: Path, require_t
     ours.write_bytes(EVERY["pcapng"][1](list(exchanges(10))))
     subprocess.run([editcap, "-F", "pcap", ours, theirs], check=True, capture_output=True)
     assert qlinkgen("decode", "qlink", theirs).out.count("motion") == 20
+
+
+def test_the_first_bad_frame(qlinkgen: Run, tmp_path: Path) -> None:
+    bursts = list(exchanges(20))
+    for name in ("pcapng", "log words", "raw"):
+        file, wrong = tmp_path / "good", tmp_path / "bad"
+        file.write_bytes(EVERY[name][1](bursts))
+        data = bursts[7].data
+        damaged = [*bursts[:7], bursts[7]._replace(data=data[:-1] + bytes([data[-1] ^ 1])), *bursts[8:]]
+        wrong.write_bytes(EVERY[name][1](damaged))
+        good = qlinkgen("explain", "qlink", file, "--first-bad")
+        assert (good.code, good.out) == (0, "no bad frame among 40 frames\n")
+        bad = qlinkgen("explain", "qlink", wrong, "--first-bad")
+        assert bad.code == 1
+        assert bad.lines[0].startswith(f"{wrong}: frame 8, offset ")
+        assert "wrong: crc is" in bad.out
+        assert bad.out.count("motion.response") == 1
+        same = qlinkgen("explain", "qlink", file, file)
+        assert (same.code, same.out) == (0, "no difference in 40 frames\n")
+        differ = qlinkgen("explain", "qlink", file, wrong)
+        assert differ.code == 1
+        assert differ.out.count(": frame 8, offset ") == 2
+        assert differ.out.count("no errors") == 1
+        wrong.write_bytes(EVERY[name][1](bursts[:10]))
+        assert f"{wrong}: it has no more frames" in qlinkgen("explain", "qlink", file, wrong).out
+
+
+def test_an_answer_is_explained_with_its_request(qlinkgen: Run, tmp_path: Path) -> None:
+    good, bad = tmp_path / "good", tmp_path / "bad"
+    good.write_text("TX 4a\nRX 0012d687d6e3\n" * 4)
+    bad.write_text("TX 4a\nRX 0012d687d6e3\n" * 3 + "TX 4a\nRX 0012d687d6e4\n")
+    done = qlinkgen("explain", "mc1231a", bad, "--first-bad")
+    assert (done.code, done.lines[0]) == (1, f"{bad}: frame 8, offset 72")
+    assert "get_pos.response" in done.out
+    assert "wrong: checksum is" in done.out
+    assert qlinkgen("explain", "mc1231a", good, bad).out.count("get_pos.response") >= 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("a5", "--first-bad"), "--first-bad looks for a frame in a capture"),
+        (("{file}",), "two FILEs without it"),
+        (("{file}", "{file}", "--first-bad"), "two FILEs without it"),
+        (("{file}", "a5"), "is not a file"),
+    ],
+)
+def test_what_explain_takes(qlinkgen: Run, tmp_path: Path, arguments: tuple[str, ...], said: str) -> None:
+    file = tmp_path / "capture"
+    file.write_bytes(b"")
+    done = qlinkgen("explain", "qlink", *(each.format(file=file) for each in arguments))
+    assert done.code == 2
+    assert said in done.err
