@@ -165,10 +165,16 @@ def _sample(records: Iterator[Record]) -> list[Record]:
 
 
 def _covered(traffic: Traffic, records: Sequence[Record]) -> float:
-    """Return the part of the bytes that are in whole frames."""
+    """Return the part of the bytes that are in whole frames, times the part of frames that are whole."""
     total = sum(len(each.data) for each in records)
-    good = sum(place.size for event, place in traffic.decode(records) if not isinstance(event, Bad))
-    return good / total if total else 0.0
+    size = good = bad = 0
+    for event, place in traffic.decode(records):
+        if isinstance(event, Bad):
+            bad += 1
+        else:
+            good += 1
+            size += place.size
+    return size / total * good / (good + bad) if total and good else 0.0
 
 
 def _read_typed(file: BinaryIO, problems: Problems) -> Iterator[Record]:  # it raises

@@ -92,11 +92,15 @@ def test_answers_that_are_ambiguous(qlinkgen: Run, name: str, tmp_path: Path) ->
     """A response that is also a request is a response where the capture says what was sent."""
     answer = qlink.MotorPositionRequest(node=3).to_frame()  # of other drivers, an acknowledgement
     asked = qlink.MotionRequest(node=3, counter=1).to_frame()
-    bursts = [Burst(asked, START, "sent"), Burst(answer, START + 10**6, "received")]
+    bursts = [
+        *exchanges(3),
+        Burst(asked, START + 10**9, "sent"),
+        Burst(answer, START + 2 * 10**9, "received"),
+    ]
     file = tmp_path / "capture"
     file.write_bytes(EVERY[name][1](bursts))
     done = qlinkgen("decode", "qlink", file)
-    named = [each.get("message") or each["error"]["kind"] for each in records(done.out)]
+    named = [each.get("message") or each["error"]["kind"] for each in records(done.out)[-2:]]
     assert named == ["motion.request", "motor_position.request" if name == "raw" else "length"]
 
 
