@@ -15,6 +15,8 @@
         * `CommandError`: the device rejected the command in its present state
         * `Collision`: the echo of a request was garbled by another sender
         * `LoadError`: loading a program failed
+        * `NoRoom`: the transmit buffer of a ring node stayed full (also a `TimeoutError`)
+        * `NothingCame`: a wait for a message or a condition timed out (also a `TimeoutError`)
     * `PortError`: the port failed (also an `OSError`)
         * `PortMissing`: the port does not exist
         * `PortBusy`: another program uses the port
@@ -52,6 +54,8 @@ __all__ = [
     "LinkError",
     "LoadError",
     "NoReply",
+    "NoRoom",
+    "NothingCame",
     "PortBusy",
     "PortError",
     "PortLost",
@@ -265,6 +269,14 @@ class LoadError(LinkError):
         super().__init__(message, **particulars)
         self.acknowledged = acknowledged
         self.total = total
+
+
+class NoRoom(LinkError, TimeoutError):
+    """The transmit buffer of a ring node stayed full: NETSTAT bit 0 is set, nothing was sent."""
+
+
+class NothingCame(LinkError, TimeoutError):
+    """A wait of a ring node timed out."""
 
 
 class PortError(QlinkgenError, OSError):

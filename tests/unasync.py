@@ -28,7 +28,9 @@ NAMES = {
     "aclosing": "closing",
     "aio": "blocking",
     "aio_peers": "peers",
+    "drive_async": "drive",
     "host_aio": "host",
+    "ring_aio": "ring",
 }
 #: Words of prose.
 PROSE = {
@@ -85,6 +87,16 @@ PAIRS = (
         "qlinkgen/bus/host_aio.py",
         "qlinkgen/bus/host.py",
         {" for asyncio; `qlinkgen.bus.host` is derived from it.": f".\n\n{_DERIVED}\n"},
+    ),
+    Pair(
+        "qlinkgen/bus/ring_aio.py",
+        "qlinkgen/bus/ring.py",
+        {" for asyncio; `qlinkgen.bus.ring` is derived from it.": f".\n\n{_DERIVED}\n"},
+    ),
+    Pair(
+        "qlinkgen/protocols/trio/aio.py",
+        "qlinkgen/protocols/trio/nodes.py",
+        {" for asyncio; `qlinkgen.protocols.trio.nodes` is derived from it.": f".\n\n{_DERIVED}\n"},
     ),
     Pair(
         "qlinkgen/protocols/qlink/aio.py",

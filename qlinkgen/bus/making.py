@@ -14,6 +14,7 @@ from qlinkgen.link.host_rules import HostCodec, HostRules
 from qlinkgen.link.host_timing import HostTiming
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.peer import PeerEngine
+from qlinkgen.link.ring import RingCodec
 from qlinkgen.link.slave import Node
 from qlinkgen.link.transaction import Accepts
 from qlinkgen.transport.conversation import host_slack, timing_of
@@ -22,7 +23,13 @@ from qlinkgen.transport.port import Ability, Port
 
 
 def open_line(
-    codec: Module, name: str, *, baud: int | None, parity: Parity, stop_bits: StopBits, reopen: bool
+    codec: Module | RingCodec,
+    name: str,
+    *,
+    baud: int | None,
+    parity: Parity,
+    stop_bits: StopBits,
+    reopen: bool,
 ) -> Port:
     """Open a port for a protocol; see `Bus.open`."""
     speed = baud or codec.BUS.baud

@@ -9,6 +9,7 @@ from typing import Literal, TypedDict
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Event, Frame
 from qlinkgen.link.health import HealthPolicy
+from qlinkgen.link.ring_events import RingEvent
 
 Parity = Literal["none", "even", "odd"]
 StopBits = Literal[1, 2]
@@ -118,3 +119,31 @@ class DeviceOptions(TypedDict, total=False):
     turnaround: float
     forgets: float
     on_frame: Callable[[Frame], None] | None
+
+
+class RingEngineOptions(TypedDict, total=False):
+    """Options of the engine of a ring node.
+
+    cut_through: forward messages while they are received, not only when they are complete; the default.
+    patience: seconds of silence inside a message after which it is broken; 0.5 by default.
+    room: size of the transmit buffer in bytes.
+    """
+
+    cut_through: bool
+    patience: float
+    room: int
+
+
+class RingOptions(RingEngineOptions, total=False):
+    """Options of a ring node.
+
+    tx_timeout: seconds that a message waits for room in the transmit buffer; 1 by default.
+    on_event: called with each event of the engine.
+    on_frame: called with each frame, sent, taken or forwarded, and with bytes that are none.
+    logger: gets a record of each event.
+    """
+
+    tx_timeout: float
+    on_event: Callable[[RingEvent], object] | None
+    on_frame: Callable[[Frame], None] | None
+    logger: Logger | None

@@ -23,10 +23,20 @@ from qlinkgen.link.events import (
     Stray,
     TimedOut,
 )
+from qlinkgen.link.ring_events import (
+    Blocked,
+    Broken,
+    Dropped,
+    Passed,
+    Queued,
+    RingEvent,
+    StatusRaised,
+    Taken,
+)
 from qlinkgen.transport.conversation import Asker, MasterDriver
 
 #: Levels of events; what is not listed is expected on a line, and for debugging.
-_LEVELS: dict[type[Event], int] = {
+_LEVELS: dict[type[Event | RingEvent], int] = {
     Failed: logging.WARNING,
     HealthChanged: logging.WARNING,
     EchoBroken: logging.INFO,
@@ -34,9 +44,13 @@ _LEVELS: dict[type[Event], int] = {
     Refused: logging.INFO,
     Damaged: logging.INFO,
     Stray: logging.INFO,
+    Dropped: logging.WARNING,
+    StatusRaised: logging.WARNING,
+    Broken: logging.INFO,
+    Blocked: logging.INFO,
 }
 #: Texts of events, with their values.
-_TEXTS: dict[type[Event], str] = {
+_TEXTS: dict[type[Event | RingEvent], str] = {
     Sent: "sent {request}",
     Answered: "{request} answered by {response}",
     OtherAnswer: "{request} answered by {reply}: {means}",
@@ -48,6 +62,13 @@ _TEXTS: dict[type[Event], str] = {
     EchoFound: "echo of the adapter: {echo}",
     EchoBroken: "echo of the adapter is broken",
     HealthChanged: "node {node} is {state}",
+    Taken: "taken {message}",
+    Passed: "passed {frame}",
+    Queued: "sent {message}",
+    Broken: "broken message: {text}",
+    Blocked: "blocked {header}",
+    Dropped: "dropped {message}: {text}",
+    StatusRaised: "status {bit}",
 }
 
 
@@ -72,11 +93,11 @@ def tell_frames(engine: Tracing, on_frame: Callable[[Frame], None] | None) -> No
         on_frame(engine.frames.popleft())
 
 
-def log_event(logger: logging.Logger, event: Event) -> None:
+def log_event(logger: logging.Logger, event: Event | RingEvent) -> None:
     """Write an event to a logger.
 
     The record has the name of the event as its attribute `event`, and the values of the event under their
-    names: messages as their names, bytes as hex digits; the message of a `Stray` as `stray`.
+    names: messages as their names, bytes as hex digits; a message has the name of its event: `stray`.
     """
     level = _LEVELS.get(type(event), logging.DEBUG)
     if not logger.isEnabledFor(level):
@@ -84,7 +105,7 @@ def log_event(logger: logging.Logger, event: Event) -> None:
     values = {name: _plain(value) for name, value in event._asdict().items()}
     text = _TEXTS.get(type(event), type(event).__name__).format(**values)
     if "message" in values:  # a record has an attribute of that name
-        values["stray"] = values.pop("message")
+        values[type(event).__name__.lower()] = values.pop("message")
     logger.log(level, "%s", text, extra={"event": type(event).__name__, **values})
 
 

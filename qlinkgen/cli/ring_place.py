@@ -5,10 +5,10 @@ from __future__ import annotations
 from types import TracebackType
 from typing import Self
 
+from qlinkgen.bus.ring_status import paced_baud
 from qlinkgen.link.codec import Message
 from qlinkgen.link.ring import RingCodec, RingNode
 from qlinkgen.link.ring_events import NetStat, RingEvent
-from qlinkgen.protocols.trio.client import paced_baud
 from qlinkgen.transport.port import Port
 from qlinkgen.transport.ring import drive
 

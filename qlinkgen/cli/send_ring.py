@@ -12,10 +12,10 @@ from qlinkgen.cli.decode import message_record
 from qlinkgen.cli.ring_place import RingPlace, netstat_text
 from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.cli.wire_options import Line, counted, open_free
+from qlinkgen.errors import NoRoom
 from qlinkgen.link.codec import Framed
 from qlinkgen.link.ring_events import Broken, Passed, RingEvent, Taken
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.protocols.trio.errors import NoRoom
 
 #: Default time on the ring in seconds: a message of full length passes 15 nodes in less from 57600 baud on, a
 #: short one at any usual speed.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, assert_never
 
 import click
 
+from qlinkgen.bus.ring_status import engine_of
 from qlinkgen.cli.boundary import WRONG, Failure
 from qlinkgen.cli.common import load_protocol
 from qlinkgen.cli.ring_console import Console
@@ -18,7 +19,7 @@ from qlinkgen.cli.wire_options import counted, with_crc
 from qlinkgen.link.ring import RingCodec, RingNode
 from qlinkgen.model.replacement import Replacement
 from qlinkgen.protocols.trio.basic import Pointed, ProgrammedNode
-from qlinkgen.protocols.trio.client import Node, engine_of
+from qlinkgen.protocols.trio.client import Node
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.sim import FaultPlan, SimulationError

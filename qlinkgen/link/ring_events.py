@@ -73,6 +73,16 @@ class Broken(NamedTuple):
     #: Its head had been forwarded before, and was terminated as broken.
     cut_short: bool
 
+    @property
+    def offset(self) -> int:
+        """As of any fault: where it begins in what was received."""
+        return 0
+
+    @property
+    def message(self) -> str:
+        """As of any fault: its description."""
+        return self.text
+
 
 class Blocked(NamedTuple):
     """A message to another node was not forwarded: this node does not forward yet."""

@@ -13,8 +13,9 @@ import os
 from collections.abc import Iterable, Sequence
 from typing import Self, Unpack
 
+from qlinkgen.bus.ring_status import engine_of
 from qlinkgen.codecs import trio
-from qlinkgen.protocols.trio.client import Node, engine_of
+from qlinkgen.protocols.trio.client import Node
 from qlinkgen.protocols.trio.options import RingOptions
 from qlinkgen.sim.errors import SimulationError
 from qlinkgen.sim.pty_bus import PtyBus, make_looker

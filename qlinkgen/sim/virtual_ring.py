@@ -7,10 +7,11 @@ import math
 from collections.abc import Callable, Iterable
 from typing import TypeVar, Unpack
 
+from qlinkgen.bus.ring_status import engine_of
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
 from qlinkgen.protocols.trio.aio import AsyncMembraneKeypad, AsyncMotionCoordinator
-from qlinkgen.protocols.trio.client import Node, engine_of
+from qlinkgen.protocols.trio.client import Node
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.protocols.trio.nodes import MembraneKeypad, MotionCoordinator

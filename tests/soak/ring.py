@@ -19,11 +19,12 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any
 
+from qlinkgen.bus.ring_status import engine_of
 from qlinkgen.codecs import trio
 from qlinkgen.link.codec import Message
 from qlinkgen.link.ring_events import Broken, NetStat, Taken
 from qlinkgen.protocols.trio import CoordinatorNode, KeypadNode
-from qlinkgen.protocols.trio.client import Node, engine_of
+from qlinkgen.protocols.trio.client import Node
 from qlinkgen.sim import FaultPlan
 from qlinkgen.sim.ring import RingWire
 

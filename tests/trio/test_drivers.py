@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -382,11 +382,3 @@ def test_it_needs_a_running_loop() -> None:
     _far, near = memory_pair()
     with pytest.raises(RuntimeError, match="no running event loop"):
         AsyncMotionCoordinator(near)
-
-
-def test_the_faces_have_the_same_words() -> None:
-    def words(client: Callable[..., Any]) -> set[str]:
-        return {name for name in dir(client) if not name.startswith("_")}
-
-    assert words(MotionCoordinator) - words(AsyncMotionCoordinator) == {"open"}
-    assert words(AsyncMotionCoordinator) <= words(MotionCoordinator)

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from qlinkgen.bus.ring_status import engine_of
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring_events import CommsError, Dropped
 from qlinkgen.protocols.trio import CoordinatorNode, KeypadNode, MotionCoordinator
-from qlinkgen.protocols.trio.client import engine_of
 from qlinkgen.transport import open_pty
 
 

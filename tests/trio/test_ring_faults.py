@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from qlinkgen.bus.ring_status import engine_of
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring_events import Broken, NetStat
 from qlinkgen.protocols.trio import CoordinatorNode, MotionCoordinator
-from qlinkgen.protocols.trio.client import engine_of
 from qlinkgen.sim import FaultPlan, SimulationError
 from qlinkgen.sim.ring import RingWire
 from qlinkgen.sim.virtual_ring import VirtualRing

@@ -9,12 +9,13 @@ from decimal import Decimal
 
 import pytest
 
+from qlinkgen.bus.ring_status import engine_of
 from qlinkgen.codecs import trio
 from qlinkgen.link.codec import Message
 from qlinkgen.link.ring import RingNode
 from qlinkgen.link.ring_events import Taken
 from qlinkgen.protocols.trio import CoordinatorNode, KeypadNode
-from qlinkgen.protocols.trio.client import Node, engine_of
+from qlinkgen.protocols.trio.client import Node
 from qlinkgen.sim import SimulationError
 from qlinkgen.sim.virtual_ring import VirtualRing
 from qlinkgen.transport import memory_ring

@@ -9,17 +9,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from qlinkgen.errors import NoRoom, NothingCame
 from qlinkgen.link.ring_events import CommsError, NetStat
 from qlinkgen.protocols.clients import asyncio_clients
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 from qlinkgen.protocols.trio.display import Display
-from qlinkgen.protocols.trio.errors import NoRoom, NothingCame
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.protocols.trio.nodes import MembraneKeypad, MotionCoordinator, PassiveNode
 from qlinkgen.protocols.trio.printing import CHR, CURSOR, VALUE
 
 if TYPE_CHECKING:
-    from qlinkgen.protocols.trio.aio import AsyncMembraneKeypad, AsyncMotionCoordinator
+    from qlinkgen.protocols.trio.aio import AsyncMembraneKeypad, AsyncMotionCoordinator, AsyncPassiveNode
 
 __all__ = [
     "CHR",
@@ -27,6 +27,7 @@ __all__ = [
     "VALUE",
     "AsyncMembraneKeypad",
     "AsyncMotionCoordinator",
+    "AsyncPassiveNode",
     "CommsError",
     "CoordinatorNode",
     "Display",
@@ -39,4 +40,4 @@ __all__ = [
     "PassiveNode",
 ]
 
-__getattr__ = asyncio_clients(__name__, ("AsyncMembraneKeypad", "AsyncMotionCoordinator"))
+__getattr__ = asyncio_clients(__name__, ("AsyncMembraneKeypad", "AsyncMotionCoordinator", "AsyncPassiveNode"))

@@ -1,20 +1,19 @@
-"""Nodes of the ring for blocking programs: `MotionCoordinator`, `MembraneKeypad`, `PassiveNode`."""
+"""Nodes of the ring.
+
+Derived from `aio.py` by `python -m tests.unasync`: change that one, and run it.
+"""
 
 from __future__ import annotations
 
 from typing import Self, Unpack
 
+from qlinkgen.bus.ring import RingClient
+from qlinkgen.bus.ring_status import TX_TIMEOUT, paced_baud
 from qlinkgen.codecs import trio
+from qlinkgen.errors import NothingCame
 from qlinkgen.link.ring import RingNode
-from qlinkgen.protocols.trio.client import (
-    TX_TIMEOUT,
-    BlockingClient,
-    CoordinatorClient,
-    Item,
-    paced_baud,
-)
+from qlinkgen.protocols.trio.client import CoordinatorClient, Item
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode, mode_message, send_message
-from qlinkgen.protocols.trio.errors import NothingCame
 from qlinkgen.protocols.trio.facts import LINE_END, check_channel
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.protocols.trio.options import (
@@ -27,13 +26,14 @@ from qlinkgen.protocols.trio.options import (
 from qlinkgen.protocols.trio.printing import Number
 from qlinkgen.transport.opening import closing_on_error, open_port
 from qlinkgen.transport.port import Port
-from qlinkgen.transport.ring import OnEvent, RingDriver, drive
+from qlinkgen.transport.ring import RingDriver, drive
+from qlinkgen.transport.ring_driver import OnEvent
 
 
-class MotionCoordinator(CoordinatorClient, BlockingClient[CoordinatorNode]):
+class MotionCoordinator(CoordinatorClient, RingClient[CoordinatorNode]):
     """A Motion Coordinator: the network commands of BASIC as methods.
 
-    A separate thread receives and forwards, independently of the program. Any number of threads may use it.
+    It receives and forwards independently of the program. Any number of tasks of one event loop may use it.
     Nodes are numbered as in BASIC: 10 is the next one along the ring, 24 the fifteenth; a number past the end
     of the ring wraps around.
 
@@ -72,7 +72,7 @@ class MotionCoordinator(CoordinatorClient, BlockingClient[CoordinatorNode]):
     def driven(cls, node: CoordinatorNode, driver: RingDriver) -> Self:
         """Wrap a node driven elsewhere, e.g. by a simulated ring."""
         client = cls.__new__(cls)
-        BlockingClient.__init__(client, node, driver)
+        RingClient.__init__(client, node, driver)
         return client
 
     def print_(self, n: int, *items: Item, sep: str = "", end: str = LINE_END) -> None:
@@ -141,7 +141,7 @@ class MotionCoordinator(CoordinatorClient, BlockingClient[CoordinatorNode]):
         self.transmit(mode_message(n, mode))
 
 
-class MembraneKeypad(BlockingClient[KeypadNode]):
+class MembraneKeypad(RingClient[KeypadNode]):
     """A membrane keypad. It neither sends nor forwards before it receives its offset.
 
     Attributes:
@@ -167,7 +167,7 @@ class MembraneKeypad(BlockingClient[KeypadNode]):
     def driven(cls, node: KeypadNode, driver: RingDriver) -> Self:
         """Wrap a node driven elsewhere, e.g. by a simulated ring."""
         client = cls.__new__(cls)
-        BlockingClient.__init__(client, node, driver)
+        RingClient.__init__(client, node, driver)
         return client
 
     def press(self, *keys: int | str) -> None:
@@ -193,7 +193,7 @@ class MembraneKeypad(BlockingClient[KeypadNode]):
         return self.node.display.text
 
 
-class PassiveNode(BlockingClient[RingNode]):
+class PassiveNode(RingClient[RingNode]):
     """A node that forwards every message and reports it; it may send messages too.
 
     Attributes:

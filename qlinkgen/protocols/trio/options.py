@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TypedDict
-
+from qlinkgen.bus.options import RingEngineOptions
 from qlinkgen.link.ring import RingCodec
 from qlinkgen.transport.ring import OnEvent
 
 
-class RingOptions(TypedDict, total=False):
+class RingOptions(RingEngineOptions, total=False):
     """Options of `RingNode` except its speed."""
 
     codec: RingCodec
-    cut_through: bool
-    patience: float
-    room: int
 
 
 class NodeOptions(RingOptions, total=False):

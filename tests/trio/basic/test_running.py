@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from qlinkgen.bus.ring_status import TX_TIMEOUT
 from qlinkgen.link.ring_events import CommsError, NetStat
 from qlinkgen.protocols.trio import KeypadNode
 from qlinkgen.protocols.trio.basic import ProgrammedNode, parse
 from qlinkgen.protocols.trio.basic.machine import CALLS, STEPS, TICK
-from qlinkgen.protocols.trio.client import TX_TIMEOUT
 from qlinkgen.sim.virtual_ring import VirtualRing
 
 #: Lets the keypad send its keys to the next node, the coordinator.

@@ -12,11 +12,11 @@ import math
 from collections import deque
 from collections.abc import Iterable
 
+from qlinkgen.bus.ring_status import TX_TIMEOUT
 from qlinkgen.codecs import trio
 from qlinkgen.protocols.trio.basic.errors import BasicError, Place
 from qlinkgen.protocols.trio.basic.expressions import Scope
 from qlinkgen.protocols.trio.basic.parser import Program
-from qlinkgen.protocols.trio.client import TX_TIMEOUT
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 
 #: Most steps in a tick.
