@@ -10,14 +10,17 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 import pytest
 
 if TYPE_CHECKING:  # pytest imports this module in every run
-    from qlinkgen.bus import aio, blocking
+    from qlinkgen.bus import aio, blocking, ring, ring_aio
+    from qlinkgen.bus.ring_status import RingHandlers
     from qlinkgen.link.slave import Node
     from qlinkgen.sim.joining import Joined
+    from qlinkgen.sim.joining_rings import JoinedRing
 
+    G = TypeVar("G", bound=ring.Ring | ring_aio.AsyncRing)
     M = TypeVar("M", bound=blocking.Calls | aio.AsyncCalls)
 
 #: Classes of a bus module that ask; a schema has one of them.
-_ASKERS = ("Bus", "Device", "Peer")
+_ASKERS = ("Bus", "Device", "Peer", "Ring")
 
 
 class BusPairs:
@@ -30,10 +33,15 @@ class BusPairs:
     def __call__(self, master: type[M], *handlers: Node, **options: Any) -> Joined[M]: ...
 
     @overload
-    def __call__(self, master: str, *handlers: Node, **options: Any) -> Joined[Any]: ...
+    def __call__(self, master: type[G], *handlers: RingHandlers, **options: Any) -> JoinedRing[G]: ...
 
-    def __call__(self, master: Any, *handlers: Node, asynchronous: bool = False, **options: Any) -> Any:
+    @overload
+    def __call__(self, master: str, *handlers: Any, **options: Any) -> Any: ...
+
+    def __call__(self, master: Any, *handlers: Any, asynchronous: bool = False, **options: Any) -> Any:
         """Join a master with slaves; see `qlinkgen.sim.joining.join` for the arguments.
+
+        Of a ring, join a node with others; see `qlinkgen.sim.joining_rings.join_ring`.
 
         Args:
             master: a class such as `oven_bus.Bus`, or the module of a protocol, such as "my.wire.oven".
@@ -41,10 +49,16 @@ class BusPairs:
             asynchronous: take the class for asyncio, if `master` is a module.
             options: `transport`, `faults`, `turnaround` and options of the class.
         """
-        from qlinkgen.sim.joining import join  # noqa: PLC0415
-
         if isinstance(master, str):
             master = _class_of(master, "Async" if asynchronous else "")
+        from qlinkgen.bus import ring, ring_aio  # noqa: PLC0415
+
+        if issubclass(master, ring.Ring | ring_aio.AsyncRing):
+            from qlinkgen.sim.joining_rings import join_ring  # noqa: PLC0415
+
+            return self._stack.enter_context(join_ring(master, *handlers, **options))
+        from qlinkgen.sim.joining import join  # noqa: PLC0415
+
         return self._stack.enter_context(join(master, *handlers, **options))
 
 

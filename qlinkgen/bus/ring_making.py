@@ -28,7 +28,7 @@ class Inbox:
         self.node: RingNode | None = None
 
     def handle(self, message: Framed, now: float) -> None:
-        """Keep a message, or drop it if nobody receives them."""
+        """Keep a message, or drop it if they are not received."""
         if len(self._messages) < INBOX:
             self._messages.append(message)
         elif self.node is not None:
@@ -57,7 +57,7 @@ def teller(
     on_frame: Callable[[Frame], None] | None,
     logger: Logger | None,
 ) -> OnEvent | None:
-    """Return who is told of each event of a node; None if nobody is."""
+    """Return who is told of each event of a node; None without one."""
     if on_event is None and on_frame is None and logger is None:
         return None
 

@@ -29,6 +29,11 @@ _IN_CALLS = frozenset(
     list str tuple type accepts after_fork bus close codec engine iterate logger node on_event on_frame open
     poll port run serve stream transact transaction usual_echo watch""".split()  # noqa: SIM905
 )
+#: Further attributes of the classes of ring nodes in `qlinkgen.bus`.
+_IN_RING_CALLS = frozenset(
+    """clear_netstat commserror counters driver engine flush netstat now receive sleep transmit tx_timeout
+    wait_until""".split()  # noqa: SIM905
+)
 #: Classes, constants and imports of a codec, and constants in the body of a message class.
 _IN_MODULE = frozenset(
     """Message Request Response StreamDecoder Command Counters Fault CodecError EncodeError DecodeError
@@ -59,6 +64,11 @@ def address_argument(name: str) -> str:
 def method(name: str) -> str:
     """The method of a command in the classes of a bus module."""
     return f"{name}_" if name in _IN_CALLS or keyword.iskeyword(name) else name
+
+
+def ring_method(name: str) -> str:
+    """The method of a message in the classes of a bus module of a ring."""
+    return f"{name}_" if name in _IN_RING_CALLS else method(name)
 
 
 def message_class(name: str) -> str:

@@ -25,6 +25,8 @@ from qlinkgen.plan.hosts import host_of
 
 #: A byte that is sent to look for an echo, where receivers skip it.
 _PROBE = b"\0"
+#: Who asks, and who answers, on most buses.
+_MASTERS = ("masters", "slaves")
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,7 @@ class Asker:
         node_calls: name of its class of calls.
         both: the other side asks, too.
         host: it is the device of a host.
+        ring: it is a node of a ring.
         selects: what its commands act on and select, "" for others; `node` is the class of one.
     """
 
@@ -47,11 +50,14 @@ class Asker:
     node_calls: str = ""
     both: bool = False
     host: bool = False
+    ring: bool = False
     selects: str = ""
 
     @property
     def base(self) -> str:
         """The class of qlinkgen that it is derived from."""
+        if self.ring:
+            return "Ring"
         return "Link" if self.both else "Host" if self.host else "Bus"
 
     @property
@@ -93,7 +99,10 @@ class Ports:
         frame = frame_plan(plan.protocol.frame)
         in_step = isinstance(frame.receiver, InStep)
         self._host = in_step and host_of(plan) is not None
-        driven = self._host or (plan.protocol.bus.kind in {"master_slave", "link"} and not in_step)
+        self._ring = plan.protocol.bus.kind == "ring"
+        driven = (
+            self._host or self._ring or (plan.protocol.bus.kind in {"master_slave", "link"} and not in_step)
+        )
         self._askers = askers if driven else ()
         self._slave = slave and driven and not any(each.both for each in askers)
         self._nodes = nodes
@@ -118,7 +127,7 @@ class Ports:
     def _text(self, prefix: str) -> str:
         slave = self._slave and not prefix
         first, *others = banner(self._protocol)
-        whom = ("hosts", "devices") if self._host else ("masters", "slaves")
+        whom = ("hosts", "devices") if self._host else ("nodes of a ring", "") if self._ring else _MASTERS
         what = f"{whom[0]} for asyncio" if prefix else " and ".join(whom) if slave else whom[0]
         head = one_line(f"{first}: {what} that open a port.")
         lines = [line for other in others for line in textwrap.wrap(one_line(other), WIDTH)]
@@ -142,8 +151,11 @@ class Ports:
     def _view(self, asker: Asker, prefix: str) -> _View:
         bus = asker.node and not asker.host
         what = "One side of the link" if asker.both else "The bus" if bus else "The device on a line"
+        what = "A node of the ring" if asker.ring else what
         whom = "tasks of one event loop" if prefix else "threads"
-        text = f"{what}, a method for each command, for any number of {whom}."
+        text = (
+            f"{what}, a method for each {'message' if asker.ring else 'command'}, for any number of {whom}."
+        )
         return _View(
             name=prefix + asker.name,
             base=f"{prefix}{asker.base}Base",
@@ -158,7 +170,8 @@ class Ports:
         )
 
     def _imports(self, prefix: str) -> Iterator[str]:
-        module = ("host_aio" if prefix else "host") if self._host else "aio" if prefix else "blocking"
+        own = "host" if self._host else "ring" if self._ring else ""
+        module = f"{own}{'_' * bool(own)}aio" if prefix else own or "blocking"
         used = {each.base for each in self._askers}
         used |= {each.node_base for each in self._askers if each.node}
         imports = [f"from qlinkgen.bus.{module} import {prefix}{name} as {prefix}{name}Base" for name in used]
