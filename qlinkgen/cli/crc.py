@@ -10,6 +10,7 @@ import click
 
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.common import parse_hex, warn
+from qlinkgen.cli.crc_unknown import Recovered, recover
 from qlinkgen.cli.tables import Table, heading
 from qlinkgen.model.checksum import Checksum, of_width
 
@@ -53,6 +54,9 @@ class _Fit:
 def command(hex_: tuple[str, ...], width: str | None) -> int:
     """List the check values that schemas can name, or find those that fit all the given frames.
 
+    If none fits, the parameters of a CRC are computed: this takes three frames of one length, or two pairs,
+    and frames of three lengths in all to tell init and xorout apart.
+
     Each HEX is one whole frame, in quotes if it has blanks. The check value is searched at the end of the
     frames, in both byte orders, before up to two other bytes, and over the bytes before it except the first
     ones. Exit code 1 if none fits.
@@ -69,11 +73,15 @@ def command(hex_: tuple[str, ...], width: str | None) -> int:
     if not all(frames):
         raise Failure("HEX is empty; give the bytes of a frame")
     fits = sorted(_fits(frames, sizes), key=lambda fit: fit.oddity)
-    if not fits:
-        click.echo("no check value fits: give whole frames, each in quotes")
-        return WRONG
-    _show(fits, frames)
-    return FINE
+    if fits:
+        _show(fits, frames)
+        return FINE
+    if own := recover(frames, sizes):
+        _show_own(own, frames)
+        return FINE
+    click.echo("no check value fits: give whole frames, each in quotes")
+    click.echo("for a CRC without a name: at least three frames of one length, and some of two others")
+    return WRONG
 
 
 def _list(sizes: Sequence[int]) -> None:
@@ -94,6 +102,27 @@ def _fits(frames: Sequence[bytes], sizes: Sequence[int]) -> Iterator[_Fit]:
                     _Fit(algorithm, size, order, lead, end) for lead in range(_LEADS) for end in range(_ENDS)
                 )
                 yield from (fit for fit in tried if all(map(fit.holds, frames)))
+
+
+def _show_own(own: Recovered, frames: Sequence[bytes]) -> None:
+    crc, place = own.algorithm, own.place
+    digits = 2 * place.size
+    click.echo("a CRC that has no name in the catalogue fits; in a schema:")
+    reflected = "true" if crc.refin else "false"
+    click.echo(
+        f"  algorithm: {{width: {crc.width}, poly: 0x{crc.poly:0{digits}X}, init: 0x{crc.init:0{digits}X}, "
+        f"refin: {reflected}, refout: {reflected}, xorout: 0x{crc.xorout:0{digits}X}}}"
+    )
+    if place.size > 1:
+        click.echo(f"  byteorder: {place.order}")
+    covers = f"all before it from byte {place.lead} on" if place.lead else "all before it"
+    click.echo(f"it covers {covers}; {place.end} bytes follow it")
+    if own.open_bits:
+        lengths = len({len(each) for each in frames})
+        warn(
+            f"{own.open_bits} bits of init and xorout are open: frames of {lengths} "
+            f"length{'' if lengths == 1 else 's'} fit other values too; give frames of further lengths"
+        )
 
 
 def _show(fits: Sequence[_Fit], frames: Sequence[bytes]) -> None:

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import random
+import re
+from collections.abc import Sequence
+from typing import Literal
+
 import pytest
 
+from qlinkgen.cli.crc_unknown import recover
+from qlinkgen.model.checksum import Algorithm, catalogue
 from tests.cli.conftest import Run
 
 
@@ -45,9 +52,78 @@ def test_what_fits_all_frames(qlinkgen: Run, frames: tuple[str, ...], found: str
 
 def test_nothing_fits(qlinkgen: Run) -> None:
     result = qlinkgen("crc", "0102030405060708", "1112131415161799", "21", "deadbeef00c0ffee")
-    assert (result.code, result.out) == (1, "no check value fits: give whole frames, each in quotes\n")
+    assert result.code == 1
+    assert "no check value fits: give whole frames, each in quotes\n" in result.out
 
 
 def test_a_short_check_value_is_uncertain(qlinkgen: Run) -> None:
     assert "give more frames" in qlinkgen("crc", "680301040516").err
     assert qlinkgen("crc", "").code == 2
+
+
+ORDERS: tuple[Literal["big", "little"], ...] = ("big", "little")
+
+
+def frames_of(
+    crc: Algorithm, order: Literal["big", "little"], lengths: Sequence[int], seed: int
+) -> list[bytes]:
+    chance = random.Random(seed)
+    found = []
+    for size in lengths:
+        data = chance.randbytes(size)
+        found.append(data + crc.compute(data).to_bytes(crc.width // 8, order))
+    return found
+
+
+@pytest.mark.parametrize("width", [8, 16, 24, 32, 64])
+@pytest.mark.parametrize("seed", range(8))
+def test_parameters_without_a_name(width: int, seed: int) -> None:
+    """Eight frames of three lengths tell all parameters, or those of a CRC that never differs."""
+    chance = random.Random(1000 * width + seed)
+    reflected = chance.random() < 0.5
+    bits = chance.getrandbits
+    crc = Algorithm("own", width, bits(width) | 1, bits(width), reflected, reflected, bits(width), 0)
+    order = chance.choice(ORDERS)
+    frames = frames_of(crc, order, (5, 5, 5, 5, 8, 8, 8, 9), seed)
+    found = recover(frames, [width // 8])
+    assert found is not None
+    assert found.open_bits == 0
+    assert (found.algorithm.poly, found.algorithm.refin) == (crc.poly, reflected)
+    assert found.place.order == (order if width > 8 else "big")
+    for size in range(1, 40):
+        data = chance.randbytes(size)
+        assert found.algorithm.compute(data) == crc.compute(data)
+    one = recover(frames_of(crc, order, (9,) * 8, seed), [width // 8])
+    assert one is not None
+    assert one.open_bits > 0
+    assert one.algorithm.poly == crc.poly
+
+
+@pytest.mark.parametrize("name", [each.name for each in catalogue() if each.width in {8, 16, 32}][::3])
+def test_names_are_among_the_first(qlinkgen: Run, name: str) -> None:
+    crc = next(each for each in catalogue() if each.name == name)
+    order: Literal["big", "little"] = "little" if crc.refin else "big"
+    frames = frames_of(crc, order, (4, 7, 12), 1)
+    lines = qlinkgen("crc", *(each.hex() for each in frames)).out.splitlines()
+    assert name in [line.split()[0] for line in lines[2:5] if line]
+
+
+def test_what_is_said_of_own_parameters(qlinkgen: Run) -> None:
+    crc = Algorithm("own", 16, 0x1337, 0xBEEF, True, True, 0x5A5A, 0)
+    frames = [b"\x55" + each for each in frames_of(crc, "little", (5, 5, 5, 8, 8, 9), 3)]
+    done = qlinkgen("crc", *(each.hex() for each in frames))
+    assert done.code == 0
+    assert "algorithm: {width: 16, poly: 0x1337, init: 0x" in done.out
+    assert "refin: true, refout: true, xorout: 0x" in done.out
+    assert "byteorder: little" in done.out
+    assert not done.err
+    open_ = qlinkgen("crc", *(each.hex() for each in frames[:3]))
+    assert re.search(r"\d+ bits of init and xorout are open: frames of 1 length fit", open_.err)
+
+
+def test_data_without_a_check_value() -> None:
+    chance = random.Random(9)
+    for _ in range(30):
+        assert recover([chance.randbytes(10) for _ in range(6)], [2, 4]) is None
+    assert recover([b"", b"\1", b"\1\2"], [1]) is None
+    assert recover([b"\1\2\3"] * 5, [1, 2]) is None
