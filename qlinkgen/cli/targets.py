@@ -38,6 +38,9 @@ TARGETS = {
         Target("python", "typed module, standard library only", "qlinkgen.backends.python"),
         Target("bus", "typed calls of masters and handlers of slaves", "qlinkgen.backends.python.bus"),
         Target("c", "self-contained C99 header", "qlinkgen.backends.c"),
+        Target(
+            "master", "non-blocking master in C, beside the header of target c", "qlinkgen.backends.c.master"
+        ),
         Target("construct", "structures for the construct library", "qlinkgen.backends.construct"),
         Target("vectors", "test vectors as JSON", "qlinkgen.backends.vectors"),
         Target(
@@ -48,8 +51,9 @@ TARGETS = {
     )
 }
 
-#: Default targets. A conformance kit is large, and needed only once for each new platform.
-DEFAULT = tuple(name for name in TARGETS if name != "conformance")
+#: Default targets. A conformance kit is large, and needed only once for each new platform; a master in C does
+#: not exist for every schema.
+DEFAULT = tuple(name for name in TARGETS if name not in {"conformance", "master"})
 
 
 #: Generated parts of docs/; only in the project's own repository.

@@ -29,7 +29,9 @@ from qlinkgen.sim.refusals import Refusals
 from qlinkgen.transport import Port
 from tests.bus.cases import Case, numbers_of
 from tests.bus.wires import asker, codec_of
+from tests.library.protocols import described
 from tests.soak.buses import vary
+from tests.support.cmaster import CMaster
 from tests.support.memory_line import MemoryLine
 from tests.support.needs import decided_by_parameter
 from tests.support.pty_line import PtyLine
@@ -42,9 +44,9 @@ Fault = Callable[[bytes], Disturbed]
 
 @dataclass(frozen=True)
 class Setting:
-    """The client and the transport of a rig."""
+    """The client and the transport of a rig; the client "c" is a blocking one whose engine is in C."""
 
-    client: Literal["blocking", "asyncio"]
+    client: Literal["blocking", "asyncio", "c"]
     transport: Literal["virtual", "memory", "pty"]
 
     def __str__(self) -> str:
@@ -54,6 +56,8 @@ class Setting:
     @property
     def needs(self) -> frozenset[str]:
         """Markers of a test in this setting."""
+        if self.client == "c":
+            return frozenset({"program"})
         return frozenset({"pty"} if self.transport == "pty" else ())
 
     @property
@@ -306,6 +310,10 @@ def make_rig(
     with contextlib.ExitStack() as stack:
         port, loop_factory = stack.enter_context(_port(setting, wire))
         joined = stack.enter_context(join_at(port, wire, kind, *nodes, **given))
+        if setting.client == "c":
+            timing, expected = joined.master.engine.timing, given["echo"] == "expect"
+            model = described(protocol).model
+            joined.master.engine = CMaster(model, codec, timing, echoes=expected)
         rig = Rig(setting, joined, nodes, script)
         wire.taps.append(
             lambda at, source, data: (

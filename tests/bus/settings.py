@@ -22,6 +22,11 @@ ON_PTYS = NAMES if os.environ.get("QLINKGEN_PTYS") == "all" else ("dynamixel_2",
 VIRTUAL = [Setting("blocking", "virtual"), Setting("asyncio", "virtual")]
 MEMORY = [Setting("blocking", "memory"), Setting("asyncio", "memory")]
 PTY = [Setting("blocking", "pty"), Setting("asyncio", "pty")]
+#: The master in C, on a virtual clock; for protocols of which it has every command.
+IN_C = Setting("c", "virtual")
+NAMES_IN_C = (
+    "cobs", "modbus_ascii", "modbus_rtu", "msp", "pelco_d", "qlink", "shdlc", "slip", "ubx", "vesc", "xbee",
+)  # fmt: skip
 
 
 def _pairs(*settings: Setting) -> list[Any]:
@@ -30,12 +35,13 @@ def _pairs(*settings: Setting) -> list[Any]:
         for name in NAMES
         for setting in settings
         if setting.transport != "pty" or name in ON_PTYS
+        if setting is not IN_C or name in NAMES_IN_C
     ]
 
 
-everywhere = pytest.mark.parametrize(("name", "setting"), _pairs(*VIRTUAL, *MEMORY, *PTY))
+everywhere = pytest.mark.parametrize(("name", "setting"), _pairs(*VIRTUAL, IN_C, *MEMORY, *PTY))
 #: Where time is exact.
-timed = pytest.mark.parametrize(("name", "setting"), _pairs(*VIRTUAL))
+timed = pytest.mark.parametrize(("name", "setting"), _pairs(*VIRTUAL, IN_C))
 #: Where other tasks run meanwhile.
 tasks = pytest.mark.parametrize(("name", "setting"), _pairs(VIRTUAL[1], MEMORY[1], PTY[1]))
 

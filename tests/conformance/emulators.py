@@ -23,8 +23,10 @@ def big_endian(kit: Path, folder: Path, require: Require) -> kits.Report:
     return kits.ran(emulator, program)
 
 
-def cortex_m3(name: str, kit: Path, folder: Path, require: Require, optimisation: str = "-O0") -> kits.Report:
-    """A kit on a Cortex-M3 without a library."""
+def cortex_m3(
+    name: str, kit: Path, folder: Path, require: Require, optimisation: str = "-O0", *flags: str
+) -> kits.Report:
+    """A kit on a Cortex-M3 without a library; `flags` for the compiler."""
     compiler = require("arm-none-eabi-gcc", package="gcc-arm-none-eabi")
     emulator = require("qemu-system-arm", package="qemu-system-arm")
     script = kits.TARGETS_DIR / "arm_link.ld"
@@ -33,6 +35,7 @@ def cortex_m3(name: str, kit: Path, folder: Path, require: Require, optimisation
         compiler,
         *("-mcpu=cortex-m3", "-mthumb", "-std=gnu99", optimisation, *_SMALL),
         *("-nostdlib", "-T", script, "-DCONFORMANCE_MAIN=0", f"-DKIT={name}_conformance"),
+        *flags,
         *(kits.TARGETS_DIR / "arm_start.c", kit, "-lgcc"),
     )
     return kits.ran(emulator, *_MACHINE, "-kernel", program)

@@ -324,14 +324,14 @@ def _initial(command: Command, sent: Message, answer: Message, address: str) -> 
     numbers = {value.name: value.type for value in sent.values}
     sizes = [
         f"response.{name}_{fields[name].quantity} = "
-        f"({count_type(fields[name].most)}){_number(numbers[asked], f'request.{member(asked)}')};"
+        f"({count_type(fields[name].most)}){items_said(numbers[asked], f'request.{member(asked)}')};"
         for name, asked in (command.sizes if sent is command.sized_by else ())
         if not fields[name].fixed
     ]
     return [*sizes, *of_response(command, sent, answer, address)]
 
 
-def _number(kind: FieldType, raw: str) -> str:
+def items_said(kind: FieldType, raw: str) -> str:
     """The number of items that a raw number says."""
     scaling = kind.scaling if isinstance(kind, Scalar) else None
     if scaling is None:
@@ -482,8 +482,8 @@ def transactions(protocol: Protocol, upper: str, commands: tuple[Command, ...]) 
         Transaction(
             constant=f"{upper}_{snake(command.name).upper()}",
             answered=command.response is not None,
-            bits=_bits(command.response_within, protocol.bus),
-            microseconds=_microseconds(command.response_within),
+            bits=bits_of(command.response_within, protocol.bus),
+            microseconds=microseconds_of(command.response_within),
             addressing=command.addressing.upper(),
             repeat=_repeat(command.repeat),
             counter=command.repeat.counter,
@@ -499,11 +499,13 @@ def _repeat(repeat: Repeat) -> str:
     return "SAFE" if repeat.safe else "UNSAFE"
 
 
-def _bits(allowance: Allowance, bus: Bus) -> int:
+def bits_of(allowance: Allowance, bus: Bus) -> int:
+    """The bit times of a time limit, rounded up."""
     bits = allowance.byte_times * bus.bits_per_byte
     return -(-bits.numerator // bits.denominator)
 
 
-def _microseconds(allowance: Allowance) -> int:
+def microseconds_of(allowance: Allowance) -> int:
+    """The microseconds of a time limit beside its bit times, rounded up."""
     time = allowance.seconds * 1_000_000
     return -(-time.numerator // time.denominator)
