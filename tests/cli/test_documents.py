@@ -35,6 +35,7 @@ DOCUMENTS = [
     "docs/plan.md",
     "docs/quick-start.md",
     "docs/write-a-slave.md",
+    "docs/write-a-master.md",
     "docs/stream-motion.md",
     "docs/load-firmware.md",
     "docs/own-io.md",
