@@ -58,6 +58,8 @@ driven_protocol_argument = click.argument(
 )
 #: PORT.
 port_argument = click.argument("port", shell_complete=_completing("ports"))
+#: [PORT], of a command that also has traffic from elsewhere.
+optional_port_argument = click.argument("port", required=False, shell_complete=_completing("ports"))
 #: [MESSAGE], after PROTOCOL.
 message_argument = click.argument("message", required=False, shell_complete=_completing("messages"))
 #: [FIELD=VALUE]..., after MESSAGE.

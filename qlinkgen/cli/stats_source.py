@@ -68,36 +68,50 @@ def heard_on_bus(
     baud: int,
     accepts: Mapping[str, Accepts] | None,
 ) -> Iterator[Seen]:
-    """Return the events of a bus: requests with their answers, repeats, late and missing ones.
-
-    Captures without times are read as if bytes came one after the other; their events have no times.
-    """
-    timing = Timing.of(codec, host_slack=SLACK, baud=baud)
-    monitor = Monitor(codec, timing, accepts=accepts)
+    """Return the events of a bus: requests with their answers, repeats, late and missing ones."""
+    listening = Listening(codec, Timing.of(codec, host_slack=SLACK, baud=baud), accepts)
     told = Told(protocol, wanted)
-    start: int | None = None
-    now = 0.0
-    timed = True
-    for record in records:
-        if record.at is None:
-            timed = False
-            now += timing.silence * 2 + len(record.data) * timing.byte_time
-        else:
-            start = record.at if start is None else start
-            now = max(now, (record.at - start) / NANO)
-        monitor.receive(record.data, now)
-        yield from _seen(monitor, told, start if timed else None)
-    monitor.finish(now + timing.longest_allowance + 10.0)
-    yield from _seen(monitor, told, start if timed else None)
-
-
-def _seen(monitor: Monitor, told: Told, start: int | None) -> Iterator[Seen]:
-    while monitor.heard:
-        heard = monitor.heard.popleft()
-        at = None if start is None else start + round(heard.at * NANO)
-        seen = _event(heard, told, at)
+    for heard in listening.heard(records):
+        start = listening.start
+        seen = _event(heard, told, None if start is None else start + round(heard.at * NANO))
         if seen is not None:
             yield seen
+
+
+class Listening:
+    """A monitor that listens to a capture.
+
+    Captures without times are read as if bytes came one after the other.
+
+    Attributes:
+        monitor: it decodes.
+        start: nanoseconds at 0 of the times of events; None if the capture has none.
+    """
+
+    def __init__(self, codec: ModuleType, timing: Timing, accepts: Mapping[str, Accepts] | None) -> None:
+        self.monitor = Monitor(codec, timing, accepts=accepts)
+        self.start: int | None = None
+        self._timing = timing
+
+    def heard(self, records: Iterable[Record]) -> Iterator[Heard]:
+        """Return what is heard, with times in seconds since the first record."""
+        timing, heard = self._timing, self.monitor.heard
+        first: int | None = None
+        now = 0.0
+        for record in records:
+            if record.at is None:
+                now += timing.silence * 2 + len(record.data) * timing.byte_time
+                self.start = None
+            else:
+                if first is None:
+                    first = self.start = record.at
+                now = max(now, (record.at - first) / NANO)
+            self.monitor.receive(record.data, now)
+            while heard:
+                yield heard.popleft()
+        self.monitor.finish(now)
+        while heard:
+            yield heard.popleft()
 
 
 def _event(heard: Heard, told: Told, at: int | None) -> Seen | None:

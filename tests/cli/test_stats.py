@@ -157,3 +157,28 @@ def test_load_over_any_time() -> None:
     assert load.bytes()[0] == 30
     assert len(load.bytes()) <= 240
     assert load.piece * len(load.bytes()) >= 3600 * 10**9
+
+
+def test_a_monitor_of_a_capture(qlinkgen: Run, capture: Path, tmp_path: Path) -> None:
+    done = qlinkgen("monitor", "qlink", "--capture", capture)
+    assert done.code == 0
+    assert "qlinkgen: 201 frames; 0 bytes outside frames" in done.err
+    assert done.lines[0].split()[:6] == ["0.000000", "master", ">", "node", "3", "motion.request"]
+    assert "[after 3.00 ms]" in done.lines[1]
+    for said in ("[repeat]", "[late, after 50.00 ms]", "damaged (crc)", "[not answered]"):
+        assert said in done.out
+    found = [json.loads(line) for line in qlinkgen("monitor", "qlink", "--capture", capture, "--json").lines]
+    assert found[1]["delay"] == pytest.approx(0.003)
+    assert [each["at"] for each in found] == sorted(each["at"] for each in found)
+    assert len(qlinkgen("monitor", "qlink", "--capture", capture, "--count", "3").lines) == 3
+    for arguments, message in (
+        (("qlink",), "give a PORT, or --capture FILE"),
+        (("qlink", "/dev/null", "--capture", capture), "give a PORT, or --capture FILE"),
+        (("trio", "--capture", capture), "`qlinkgen decode trio"),
+    ):
+        done = qlinkgen("monitor", *arguments)
+        assert done.code == 2
+        assert message in done.err
+    empty = tmp_path / "empty"
+    empty.write_bytes(b"")
+    assert qlinkgen("monitor", "qlink", "--capture", empty).code == 1
