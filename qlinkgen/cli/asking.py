@@ -8,6 +8,9 @@ from collections.abc import Callable, Iterator
 from types import ModuleType
 from typing import NamedTuple, TypeVar
 
+from qlinkgen.bus.making import make_host
+from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.hosting import check_resync
 from qlinkgen.cli.tracing import trace_of, trace_option
 from qlinkgen.cli.wire_options import (
     Parity,
@@ -16,16 +19,19 @@ from qlinkgen.cli.wire_options import (
     echo_option,
     line_of,
     matching,
+    open_free,
     open_usual,
     parity_option,
     slack_option,
     stop_bits_option,
 )
 from qlinkgen.link.events import Event
+from qlinkgen.link.host import HostEngine
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.transport.blocking import BlockingMaster
 from qlinkgen.transport.conversation import timing_of
+from qlinkgen.transport.port import Port
 
 R = TypeVar("R")
 
@@ -79,10 +85,34 @@ def master_at(  # what a master consists of
     Raises:
         PortError: the port is missing or busy.
     """
-    with contextlib.ExitStack() as ended:
-        trace = trace_of(protocol, codec, port, ended, traced=asking.traced, record=None)
-        line = line_of(asking.parity, asking.stop_bits, trace.hear if trace else None)
-        opened = ended.enter_context(open_usual(protocol, port, asking.baud, line))
+    with _opened(port, protocol, codec, asking) as opened:
         timing = timing_of(codec, opened, slack=asking.slack, attempts=attempts)
         engine = MasterEngine(codec, timing, echo=echo_mode(protocol, asking.echo), accepts=matching(name))
         yield engine, BlockingMaster(engine, opened, on_event=on_event)
+
+
+@contextlib.contextmanager
+def host_at(
+    port: str, protocol: Protocol, codec: ModuleType, asking: Asking, *, attempts: int = 3
+) -> Iterator[tuple[HostEngine, BlockingMaster]]:
+    """Do the same for the host of a device, which takes no echo.
+
+    Raises:
+        Failure: the schema does not say how the host comes back in step.
+        PortError: the port is missing or busy.
+    """
+    check_resync(protocol)
+    if asking.echo is not None:
+        raise Failure(f"--echo requires a bus with a master; {protocol.name} has one host and one device")
+    with _opened(port, protocol, codec, asking) as opened:
+        engine = make_host(codec, opened, attempts=attempts, slack=asking.slack)
+        yield engine, BlockingMaster(engine, opened)
+
+
+@contextlib.contextmanager
+def _opened(port: str, protocol: Protocol, codec: ModuleType, asking: Asking) -> Iterator[Port]:
+    with contextlib.ExitStack() as ended:
+        trace = trace_of(protocol, codec, port, ended, traced=asking.traced, record=None)
+        line = line_of(asking.parity, asking.stop_bits, trace.hear if trace else None)
+        opener = open_free if protocol.bus.kind == "host" else open_usual
+        yield ended.enter_context(opener(protocol, port, asking.baud, line))

@@ -115,7 +115,7 @@ class Nodes:
             if answer is None or not {command.name, answer.NAME}.intersection(given_to):
                 continue
             try:
-                self._codec.encode(node.example(command))
+                node.example(command).to_bytes()
             except self._codec.EncodeError as error:
                 raise Failure(str(error)) from None
 

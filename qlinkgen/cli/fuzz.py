@@ -16,7 +16,7 @@ from qlinkgen.cli.common import addressed, crc_option, did_you_mean, load_protoc
 from qlinkgen.cli.fuzz_cases import DAMAGED, VALID, Cases
 from qlinkgen.cli.fuzz_cases import WRONG as WRONG_FRAME
 from qlinkgen.cli.fuzz_run import RESULTS, Bench, Outcome, Tally
-from qlinkgen.cli.kinds import BUS, kind_of
+from qlinkgen.cli.kinds import BUS, HOST, kind_of
 from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.cli.tables import Table
 from qlinkgen.cli.wire_options import counted
@@ -84,7 +84,12 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen fuzz modbus_rtu /dev/ttyUSB0 --node 1 --command read_holding_registers --count 2000 --seed 7
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc)
-    if kind_of(loaded) is not BUS:
+    if (kind := kind_of(loaded)) is HOST:
+        raise Failure(
+            f"fuzz requires frames that can be wrong; packets of {loaded.name} have no check value, so that "
+            "damaged ones are other requests"
+        )
+    if kind is not BUS:
         raise Failure(f"fuzz requires a bus with a master, and {loaded.name} is not one")
     commands = _commands(loaded, names, everything=everything)
     address = _address(loaded, commands, node)

@@ -67,13 +67,20 @@ BELONGS: Belongs = {
 @echo_option
 @parity_option
 @stop_bits_option
-@click.option("--axis", type=click.IntRange(1, 2), metavar="N", help="mc1231a: the axis to select first.")
+@click.option(
+    "--axis",
+    "--select",
+    "axis",
+    type=click.IntRange(0),
+    metavar="N",
+    help="A host: the number of what the command acts on, such as an axis, which is selected first.",
+)
 @click.option(
     "--checksum",
     type=click.Choice(["always", "never"]),
     default="always",
     show_default=True,
-    help="mc1231a: whether to read the checksum after the response.",
+    help="A host: whether to read the checksum after the response.",
 )
 @click.option(
     "--check", is_flag=True, help="mc1231a: then read the status word, and fail on a command error."
@@ -139,8 +146,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     is left out while the previous request is pending. Exit code 1 if no request is answered.
 
     On a ring, the command joins as an additional node: it forwards messages, prints those for this node, and
-    leaves after --seconds, as soon as it forwards nothing. Delivery of the message is not confirmed. For
-    mc1231a, --axis sends set_1 or set_2 first; without it, the current axis is used.
+    leaves after --seconds, as soon as it forwards nothing. Delivery of the message is not confirmed. The
+    host of a device selects --axis first if the schema says how; without it, the current one is used.
 
     Exit code 1 if the response is missing or wrong, if the node refuses (its reply is printed), or if the
     port is missing, busy or lost; 2 if the request is invalid, and nothing was sent.
@@ -172,10 +179,10 @@ def command(  # noqa: PLR0917  # click passes them by name
             send_into_ring(loaded, codec, request, port, seconds=stay, count=count, baud=baud, line=line)
             return FINE
         if kind is HOST:
-            from qlinkgen.cli.send_host import send_to_chip  # noqa: PLC0415
+            from qlinkgen.cli.send_host import send_to_device  # noqa: PLC0415
 
-            send_to_chip(
-                loaded, found, request, port, axis=axis, checksum=checksum, check=check,
+            send_to_device(
+                loaded, codec, request, port, axis=axis, checksum=checksum, check=check,
                 attempts=attempts, slack=slack, baud=baud, line=line,
             )  # fmt: skip
             return FINE
@@ -187,14 +194,9 @@ def command(  # noqa: PLR0917  # click passes them by name
 
 
 def _own_codec(name: str, kind: Kind) -> ModuleType | None:
-    """Return the module that the host runtime needs; None for other kinds, which work with any schema."""
-    if kind is not HOST:
+    """Return the module of a chip set, for --check; None for others, which have one of their own."""
+    if kind is not HOST or not is_shipped(name, "mc1231a"):
         return None
-    if not is_shipped(name, "mc1231a"):
-        raise Failure(
-            f"{name} has one host and one device; `qlinkgen send` supports only mc1231a of this kind, "
-            "since schemas do not describe resynchronisation"
-        )
     from qlinkgen.codecs import mc1231a  # noqa: PLC0415  # only for a chip set
 
     return mc1231a

@@ -1,28 +1,29 @@
-"""``qlinkgen send`` for a chip set: one transaction, for an axis."""
+"""``qlinkgen send`` for the host of a device: one transaction, for what is selected."""
 
 from __future__ import annotations
 
+from types import ModuleType
 from typing import Literal
 
 import click
 
+from qlinkgen.bus.making import make_host
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.decode import message_record
+from qlinkgen.cli.hosting import rules_of, selected_packet
 from qlinkgen.cli.wire_options import Line, open_free
 from qlinkgen.codecs import mc1231a
-from qlinkgen.codecs.mc1231a_bus import AxisCalls
 from qlinkgen.link.codec import Framed
-from qlinkgen.link.transaction import Packet
-from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.protocols.mc1231a import Host
-from qlinkgen.protocols.mc1231a.facts import AXES, SELECT
+from qlinkgen.protocols.mc1231a import updating
+from qlinkgen.protocols.mc1231a.facts import AXES
+from qlinkgen.transport.blocking import BlockingMaster
 
 
-def send_to_chip(
+def send_to_device(
     protocol: Protocol,
-    message: Message,
+    codec: ModuleType,
     request: Framed,
     port: str,
     *,
@@ -34,28 +35,25 @@ def send_to_chip(
     baud: int | None,
     line: Line,
 ) -> None:
-    """Select the axis if one is given, send the packet, and print the response."""
-    _check_axis(message, axis)
+    """Select what is to be selected, send the packet, and print the response."""
+    packet = selected_packet(protocol, rules_of(protocol, codec), request, axis, given=f"--axis {axis}")
     axes = _checked_axes(request, axis) if check else []
-    context = None if axis is None else SELECT[axis]
-    with (
-        open_free(protocol, port, baud, line) as opened,
-        Host(opened, checksum=checksum, attempts=attempts, slack=slack) as host,
-    ):
-        response = host.transact(Packet(request, context)).response
-        if checksum == "always" or response.FIELDS:  # otherwise the host did not wait for a response
+    with open_free(protocol, port, baud, line) as opened:
+        host = BlockingMaster(
+            make_host(codec, opened, checksum=checksum, attempts=attempts, slack=slack), opened
+        )
+        response = host.transact(packet).response
+        # Otherwise the host did not wait for a response.
+        if response is not None and (checksum == "always" or response.FIELDS):
             click.echo(jsonlines.line(message_record(protocol, response)))
         for each in axes:
-            host.raise_command_error(each)
-
-
-def _check_axis(message: Message, axis: int | None) -> None:
-    if axis is not None and not hasattr(AxisCalls, message.command):
-        raise Failure(f"{message.command} does not depend on the current axis; omit --axis {axis}")
+            host.run(updating.raise_command_error(each))
 
 
 def _checked_axes(request: Framed, axis: int | None) -> list[int]:
     """Return the axes whose status word is to be read."""
+    if not isinstance(request, mc1231a.Request):
+        raise Failure("--check reads the status word of mc1231a; omit it")
     if axis is not None:
         return [axis]
     if isinstance(request, mc1231a.MultiUpdateRequest):

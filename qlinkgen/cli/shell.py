@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from pathlib import Path
 
 import click
 
 from qlinkgen.cli.arguments import driven_protocol_argument, port_argument
-from qlinkgen.cli.asking import Asking, asking_options, master_at
+from qlinkgen.cli.asking import Asking, asking_options, host_at, master_at
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import crc_option, load_protocol
-from qlinkgen.cli.kinds import BUS, kind_of
+from qlinkgen.cli.kinds import BUS, HOST, kind_of
 from qlinkgen.cli.shell_lines import Lines, Reader, perform_all
 from qlinkgen.cli.wire_options import attempts_option
 from qlinkgen.model.protocol import Protocol
@@ -24,7 +25,11 @@ from qlinkgen.model.values import whole_number
 @driven_protocol_argument
 @port_argument
 @click.option(
-    "--node", "--address", "node", metavar="N", help="The node of requests without one of their own."
+    "--node",
+    "--address",
+    "node",
+    metavar="N",
+    help="The node of requests without one of their own, or what a host selects for them.",
 )
 @attempts_option
 @asking_options
@@ -51,14 +56,20 @@ def command(  # noqa: PLR0917  # click passes them by name
     echo motor_position | qlinkgen shell qlink /dev/ttyUSB0 --node 3
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc)
-    if kind_of(loaded) is not BUS:
-        raise Failure(f"shell requires a bus with a master, and {loaded.name} is not one")
+    kind = kind_of(loaded)
+    if kind not in {BUS, HOST}:
+        raise Failure(f"shell requires a bus with a master, or a host; {loaded.name} has none")
     number = None if node is None else whole_number(node)
     if node is not None and number is None:
         raise Failure(f"--node {node}: not a whole number")
     codec = load_codec(loaded)
-    with master_at(port, protocol, loaded, codec, asking, attempts=attempts) as (_, master):
-        lines = Lines(loaded, codec, master, number)
+    with contextlib.ExitStack() as ended:
+        if kind is HOST:
+            host = ended.enter_context(host_at(port, loaded, codec, asking, attempts=attempts))
+            lines = Lines(loaded, codec, host[1], number, host[0].rules)
+        else:
+            bus = ended.enter_context(master_at(port, protocol, loaded, codec, asking, attempts=attempts))
+            lines = Lines(loaded, codec, bus[1], number)
         on_terminal = on_terminal_input()
         fine = perform_all(lines, _editor(loaded, lines) if on_terminal else _piped)
     return FINE if fine or on_terminal else WRONG

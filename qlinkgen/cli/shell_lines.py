@@ -16,10 +16,13 @@ from qlinkgen.cli.codec import fields
 from qlinkgen.cli.common import addressed, did_you_mean, find_message
 from qlinkgen.cli.completion import assignment_items, message_items
 from qlinkgen.cli.encode import compose
+from qlinkgen.cli.hosting import selected_packet
 from qlinkgen.cli.repeating import answers_of
 from qlinkgen.cli.send_bus import check_request
 from qlinkgen.errors import LinkError
 from qlinkgen.link.codec import Framed, Message, address_of
+from qlinkgen.link.host_rules import HostRules
+from qlinkgen.link.transaction import Packet
 from qlinkgen.model.message import Message as Described
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line, visible
@@ -45,8 +48,15 @@ class Lines:
     """
 
     def __init__(
-        self, protocol: Protocol, codec: ModuleType, master: BlockingMaster, node: int | None
+        self,
+        protocol: Protocol,
+        codec: ModuleType,
+        master: BlockingMaster,
+        node: int | None,
+        rules: HostRules | None = None,
     ) -> None:
+        """Take the master; ``rules`` are those of a host, where nodes are the numbers that it selects."""
+        self._rules = rules
         self._protocol, self._codec, self._master = protocol, codec, master
         self.node = node
         self.ended = False
@@ -96,7 +106,15 @@ class Lines:
                 raise Failure(f"'{' '.join(words)}' is not a line of the shell; {hint or '.help lists them'}")
 
     def _number(self, text: str) -> int:
-        nodes, number = self._protocol.bus.nodes, whole_number(text)
+        number = whole_number(text)
+        if self._rules and self._rules.selects:
+            if number is None or number not in self._rules.selects:
+                known = ", ".join(map(str, self._rules.selects))
+                raise Failure(
+                    f".node {text}: {self._protocol.name} selects {known} as {self._rules.selected}"
+                )
+            return number
+        nodes = self._protocol.bus.nodes
         first, last = nodes or (0, 0)
         whole = number is not None and (first <= number <= last or number == self._protocol.bus.broadcast)
         if nodes is None or not whole:
@@ -132,16 +150,31 @@ class Lines:
         if not nodes and self.node is not None and addressed(self._protocol, message):
             nodes = [str(self.node)]
         values = tuple(self._without_unit(message, word) for word in rest if not word.startswith("@"))
-        request: Framed = compose(self._protocol, name, values, tuple(nodes), None, codec=self._codec)[2]
+        addresses = () if self._rules else tuple(nodes)
+        request: Framed = compose(self._protocol, name, values, addresses, None, codec=self._codec)[2]
         try:
             request.to_frame()
         except self._codec.EncodeError as error:
             raise Failure(str(error)) from None
-        reply = self._master.transact(request)
+        reply = self._master.transact(self._packet(self._rules, request, nodes) if self._rules else request)
         answers = answers_of(reply.response)
         for answer in answers:
             click.echo(visible(self._told(answer)))
         click.echo(f"  {'answered after' if answers else 'sent;'} {reply.elapsed * 1000:.2f} ms")
+
+    def _packet(self, rules: HostRules, request: Framed, given: list[str]) -> Packet:
+        """Return a request for what a host selects: the number that is given, else the one chosen before."""
+        if len(given) > 1:
+            raise Failure(f"@{' @'.join(given)}: one number is selected at a time")
+        if given:
+            number = whole_number(given[0])
+            if number is None:
+                raise Failure(f"@{given[0]}: not a whole number")
+            return selected_packet(self._protocol, rules, request, number, given=f"@{number}")
+        selection = self._protocol.bus.selection
+        command = self._protocol.command_of(self._protocol.by_name[request.NAME])
+        depends = selection is not None and command is not None and selection.decides(command)
+        return rules.packet(request, self.node if depends else None)
 
     def _without_unit(self, message: Described, word: str) -> str:
         """Remove the unit of a field after each of its numbers."""

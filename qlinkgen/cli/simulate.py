@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from qlinkgen.protocols.trio.basic import Pointed
 
 BELONGS: Belongs = {
-    **dict.fromkeys(("nodes", "echo", "value", "file", "memory", "delay", "refuse", "tap", "traced"), (BUS,)),
+    **dict.fromkeys(("nodes", "echo", "refuse", "tap", "traced"), (BUS,)),
+    **dict.fromkeys(("value", "file", "memory", "delay"), (BUS, HOST)),
     **dict.fromkeys(("ring", "programs", "keys", "closed", "length", "pointed"), (RING,)),
     "crc": (BUS, RING),
 }
@@ -144,7 +145,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     With --closed the ring has no port, and "port" is null; without a keyboard its time is simulated and
     passes at once, until nothing more can happen or 10 s after the last key.
 
-    mc1231a is a chip set with two moving axes.
+    mc1231a is a chip set with two moving axes. The device of another host answers as nodes do.
 
     Faults are drop, flip, truncate, delay, late, duplicate, stray, noise and silent, each with a probability
     from 0 to 1 and, after a colon, its extent; all=0.05 spreads 5 % over those not listed; to=slaves or
@@ -179,9 +180,18 @@ def command(  # noqa: PLR0917  # click passes them by name
             record=record,
         )
     elif kind is HOST:
+        from qlinkgen.cli.behaviour import Behaviour  # noqa: PLC0415
         from qlinkgen.cli.simulate_host import simulate_host  # noqa: PLC0415
 
-        simulate_host(link=link, listen=listen, baud=baud, plan=plan, record=record)
+        simulate_host(
+            protocol,
+            link=link,
+            listen=listen,
+            baud=baud,
+            plan=plan,
+            behaviour=Behaviour(value, file, delay, refuse, memory, seed),
+            record=record,
+        )
     else:
         from qlinkgen.cli.behaviour import Behaviour  # noqa: PLC0415
         from qlinkgen.cli.simulate_bus import simulate_bus  # noqa: PLC0415
@@ -211,11 +221,10 @@ def _kind(name: str, crc: Replacement | None) -> Kind:
         return shipped[1]
     protocol = load_protocol(name, crc)
     kind = kind_of(protocol)
-    if kind is not BUS:
-        known = "trio" if kind is RING else "mc1231a"
+    if kind is RING:
         raise Failure(
             f"{protocol.name}: `qlinkgen simulate` supports your own schemas only with bus kind "
-            f"master_slave; of kind {kind.value} it supports only {known}"
+            "master_slave, link or host; of kind ring it supports only trio"
         )
     check_options(protocol.name, kind, BELONGS)
     if not protocol.commands:

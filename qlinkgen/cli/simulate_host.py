@@ -1,37 +1,82 @@
-"""``qlinkgen simulate mc1231a``: a chip set at the end of a serial link."""
+"""``qlinkgen simulate`` for a host: the device at the end of a serial link."""
 
 from __future__ import annotations
 
 from contextlib import ExitStack
 
+from qlinkgen.cli.behaviour import Behaviour, Nodes
+from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import load_protocol
+from qlinkgen.cli.hosting import check_resync
+from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.cli.simulating import port_of, run_bus, say, watch_line
 from qlinkgen.cli.wire_options import counted
-from qlinkgen.codecs import mc1231a
+from qlinkgen.link.device import DeviceEngine
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan import plan_of
 from qlinkgen.protocols.mc1231a import ChipEngine, ChipSet
-from qlinkgen.sim import FaultPlan
-from qlinkgen.sim.chip_bus import chip_wire
+from qlinkgen.sim import FaultPlan, Wire
 
 
 def simulate_host(
-    *, link: str | None, listen: str | None, baud: int | None, plan: FaultPlan | None, record: str | None
+    name: str,
+    *,
+    link: str | None,
+    listen: str | None,
+    baud: int | None,
+    plan: FaultPlan | None,
+    behaviour: Behaviour,
+    record: str | None,
 ) -> None:
-    """Run the chip set on a pty until a signal."""
+    """Run the device of a protocol on a pty until a signal."""
     from qlinkgen.sim.pty_bus import PtyBus  # noqa: PLC0415  # needs a system that has ptys
 
+    loaded = load_protocol(name)
+    chip = ChipSet() if is_shipped(name, "mc1231a") else None
+    engine = _device(loaded, behaviour) if chip is None else _chip(chip, behaviour)
+    what = "a device" if chip is None else "chip set"
     port = port_of(listen, link, baud)
-    chip = ChipEngine(ChipSet())
-    wire = chip_wire(chip, baud=baud, faults=plan, chunks="byte" if baud is not None else "frame")
+    bits = loaded.bus.bits_per_byte
+    wire = Wire(
+        baud=baud,
+        bits_per_byte=bits,
+        faults=plan,
+        chunks="byte" if baud is not None else "frame",
+        collisions=False,  # a line for each direction
+    )
+    wire.attach(engine, what)
     with ExitStack() as ended:
         if record is not None:
-            loaded = load_protocol("mc1231a")
-            watch_line(wire, loaded, mc1231a, link or "simulated mc1231a", ended, traced=False, record=record)
-        run_bus(PtyBus(wire, link=link, port=port), link, "an mc1231a chip set")
-    for number, axis in chip.chip.axes.items():
+            codec, where = load_codec(loaded), link or f"simulated {loaded.name}"
+            watch_line(wire, loaded, codec, where, ended, traced=False, record=record)
+        run_bus(PtyBus(wire, link=link, port=port), link, f"{what} of {name}" if chip is None else _CHIP)
+    for number, axis in chip.axes.items() if chip else ():
         say(f"axis {number}: position {axis.actual}, status 0x{axis.status:04X}", None)
-    seen = chip.counters
+    seen = engine.counters
     say(
         f"{counted(seen.packets, 'packet')} executed, {seen.illegal} illegal, "
         f"{seen.out_of_range} out of range",
         plan,
     )
+
+
+_CHIP = "an mc1231a chip set"
+
+
+def _chip(chip: ChipSet, behaviour: Behaviour) -> DeviceEngine:
+    if behaviour:
+        raise Failure(
+            f"{_CHIP} behaves as documented, and takes no values; omit --value, --values, --memory "
+            "and --delay"
+        )
+    return ChipEngine(chip)
+
+
+def _device(protocol: Protocol, behaviour: Behaviour) -> DeviceEngine:
+    check_resync(protocol)
+    codec = load_codec(protocol)
+    made = Nodes(protocol, codec, plan_of(protocol), behaviour)
+    engine = DeviceEngine(codec, made.node())
+    engine.delays = made.delays
+    return engine

@@ -86,7 +86,7 @@ def test_own_words_list_what_there_is(qlinkgen: Run, on_line: OnLine) -> None:
     assert not any(name.endswith(".response") for name in listed)
 
 
-@pytest.mark.parametrize("words", [("trio", "x"), ("mc1231a", "x"), ("qlink", "x", "--node", "many")])
+@pytest.mark.parametrize("words", [("trio", "x"), ("qlink", "x", "--node", "many")])
 def test_refused(qlinkgen: Run, words: tuple[str, ...]) -> None:
     assert qlinkgen("shell", *words).code == 2
 
