@@ -68,8 +68,8 @@ BELONGS: Belongs = {
 @parity_option
 @stop_bits_option
 @click.option(
-    "--axis",
     "--select",
+    "--axis",
     "axis",
     type=click.IntRange(0),
     metavar="N",
