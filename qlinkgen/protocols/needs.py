@@ -6,8 +6,9 @@ behaviour as well. A schema that no longer states one is refused when the behavi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from types import ModuleType
 
 from qlinkgen.codecs._support import ArrayRule, BaseMessage, BytesRule, IntRule, Rule, ScaledRule
 from qlinkgen.errors import UnsuitableSchema
@@ -60,6 +61,36 @@ class Needs:
                 raise self._unsuitable(f"has no {name}")
             for field in fields.split():
                 self._rule(messages[name], field)
+
+    def names(self, codec: ModuleType, needed: Mapping[str, str]) -> None:
+        """Check that enums and flags have names.
+
+        Args:
+            codec: the generated module.
+            needed: names of values in the schema, separated by blanks, by class of the module.
+
+        Raises:
+            UnsuitableSchema: a class or a name is missing.
+        """
+        for kind, names in needed.items():
+            if not hasattr(codec, kind):
+                raise self._unsuitable(f"has no {kind}")
+            for name in names.split():
+                if not hasattr(getattr(codec, kind), name.upper()):
+                    raise self._unsuitable(f"{kind} has no {name}")
+
+    def commands(self, commands: Collection[str], handled: Collection[str]) -> None:
+        """Check that a simulation handles the commands of the schema, and no others.
+
+        Raises:
+            UnsuitableSchema: it does not.
+        """
+        for name in sorted({*commands} ^ {*handled}):
+            if name in handled:
+                raise self._unsuitable(f"has no command {name}")
+            raise UnsuitableSchema(
+                f"{self.schema} has the command {name}, which {self.user} does not know; change both together"
+            )
 
     def number(self, message: type[BaseMessage], field: str) -> int:
         """Return the largest value of a field that holds whole numbers from 0.

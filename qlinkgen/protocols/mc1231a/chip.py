@@ -12,7 +12,7 @@ from typing import Final
 from qlinkgen.codecs import mc1231a
 from qlinkgen.protocols.mc1231a.axis_commands import AXIS_COMMANDS
 from qlinkgen.protocols.mc1231a.chip_axis import ChipAxis
-from qlinkgen.protocols.mc1231a.facts import AXES, check_axis
+from qlinkgen.protocols.mc1231a.facts import AXES, NEEDS, check_axis
 
 #: Seconds of one sample of the trajectories; set_smpl_time has no unit, so it is only kept.
 SAMPLE_TIME: Final = 0.0005
@@ -253,6 +253,10 @@ class ChipSet:
         """Set an event that is not simulated, such as a commutation error."""
         self.axes[check_axis(axis)].raise_event(event)
         self._look_at_interrupts()
+
+
+_OWN: Final = {name.removeprefix("_do_") for name in vars(ChipSet) if name.startswith("_do_")}
+NEEDS.commands(mc1231a.COMMANDS, {*AXIS_COMMANDS, *_OWN})
 
 
 def _respond(response: type[mc1231a.Response] | None) -> Callable[[float | None], mc1231a.Response]:

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from qlinkgen.codecs.mc1231a import AxisStatus
-from qlinkgen.protocols.mc1231a.facts import EVENTS
+from qlinkgen.protocols.mc1231a.facts import EVENTS, AxisStatus
 from qlinkgen.protocols.mc1231a.registers import BUFFERED, after_reset
 from qlinkgen.protocols.mc1231a.trajectory import COUNTS, GEAR, S_CURVE, TRAPEZOIDAL, VELOCITY, Trajectory
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from qlinkgen.codecs import mc1231a
-from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.errors import CommandError
 from qlinkgen.link.procedure import Ask, Procedure
 from qlinkgen.link.transaction import Packet, Reply
-from qlinkgen.protocols.mc1231a.facts import AXES, SELECT, check_axis
+from qlinkgen.protocols.mc1231a.facts import AXES, SELECT, AxisStatus, check_axis
 
 
 def raise_command_error(axis: int) -> Procedure[int]:

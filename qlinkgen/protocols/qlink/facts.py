@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 from qlinkgen.codecs import qlink
-from qlinkgen.codecs.qlink import PositionType
 from qlinkgen.protocols.needs import Needs
 
 _NEEDS: Final = Needs("schemas/qlink.yaml", "qlinkgen/protocols/qlink")
@@ -41,6 +40,7 @@ _NEEDS.fields(
         "loop_back.response": "offset data",
     },
 )
+_NEEDS.names(qlink, {"PositionType": "none", "MotorStatus": "running position_valid"})
 
 BAUD: Final = _NEEDS.bus(qlink.BUS, "baud")
 BROADCAST: Final = _NEEDS.bus(qlink.BUS, "broadcast")
@@ -61,7 +61,7 @@ MOTION_INPUTS: Final = _NEEDS.number(qlink.MotionResponse, "inputs")
 #: Words of a FIFO that a node can report as free.
 MOST_SPACE: Final = _NEEDS.number(qlink.MotionResponse, "fifo_space")
 #: Ways to ask a motor for its position.
-POSITION_TYPES: Final = frozenset(PositionType.members.values()) - {PositionType.NONE}
+POSITION_TYPES: Final = frozenset(qlink.PositionType.members.values()) - {qlink.PositionType.NONE}
 #: Largest value of each number that a node states of itself; delays in seconds.
 INFO: Final = {
     field: _NEEDS.number(qlink.NodeInfoResponse, field)
