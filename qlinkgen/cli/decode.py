@@ -181,17 +181,24 @@ class _Printer:
         if isinstance(event, Bad):
             self._bad += 1
             self._faults[event.kind] += 1
-            record: dict[str, Json] = error_record(replace(event, offset=place.offset))
         else:
             self._good += 1
             if event.NAME not in self._warned:
                 self._warned.add(event.NAME)
                 warn_unconfirmed(self._protocol, self._protocol.by_name[event.NAME])
-            record = message_record(self._protocol, event)
-            record["offset"] = place.offset
-        if place.at is not None:
-            record["time"] = Decimal(place.at).scaleb(-9)
-        return record
+        return frame_record(self._protocol, event, place)
+
+
+def frame_record(protocol: Protocol, event: Event, place: Place) -> dict[str, Json]:
+    """Return the JSON object of a frame of a capture."""
+    if isinstance(event, Bad):
+        record = error_record(replace(event, offset=place.offset))
+    else:
+        record = message_record(protocol, event)
+        record["offset"] = place.offset
+    if place.at is not None:
+        record["time"] = Decimal(place.at).scaleb(-9)
+    return record
 
 
 def message_record(protocol: Protocol, found: Message) -> dict[str, Json]:
