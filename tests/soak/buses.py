@@ -1,7 +1,7 @@
 """Random transactions of protocols of the library on a bad line: none gets the answer to another.
 
-`python -m tests.soak.buses [--transactions N] [--seed N]` runs N for each protocol, on a virtual clock.
-Answers are random numbers, drawn anew in each transaction.
+`python -m tests.soak.buses [--transactions N] [--seed N]` runs N for each protocol, also with the master in
+C, on a virtual clock. Answers are random numbers, drawn anew in each transaction.
 """
 
 from __future__ import annotations
@@ -11,19 +11,26 @@ import asyncio
 import random
 import sys
 import time
+from collections.abc import Container
 from dataclasses import dataclass, field
 from typing import Any
 
 from qlinkgen.errors import LinkError
 from qlinkgen.link import Timing
+from qlinkgen.model.naming import snake
 from qlinkgen.sim import FaultPlan
 from qlinkgen.sim.generic import GenericNode
 from qlinkgen.sim.joining import join
 from qlinkgen.sim.smallest import required_values
 from tests.bus.wires import bus_of, codec_of
+from tests.library.protocols import described
+from tests.support.cmaster import CMaster
+from tests.support.cmaster_source import asks_of
 
 #: Protocols with check values of 16 bits: one of 256 damaged frames is valid where they have 8.
 NAMES = ("modbus_rtu", "dynamixel_2", "vesc", "ubx", "dnp3")
+#: Those of which the master in C has all commands with one answer.
+NAMES_IN_C = ("modbus_rtu", "vesc", "ubx")
 #: Seconds: delays of the host, and how far deadlines of the commands may differ.
 SLACK, NEAR = 0.05, 0.004
 #: Seconds after the shortest deadline: late answers come after any, while the line has to be quiet.
@@ -108,14 +115,18 @@ class Witness(GenericNode):
 class Traffic:
     """Random requests of a protocol, those with one answer and a deadline like the shortest one."""
 
-    def __init__(self, codec: Any, rng: random.Random, numbers: list[int]) -> None:
+    def __init__(
+        self, codec: Any, rng: random.Random, numbers: list[int], names: Container[str] | None = None
+    ) -> None:
+        """``names``: the commands to choose from, None for all."""
         self._rng = rng
         self._numbers = numbers
         timing = Timing.of(codec, host_slack=SLACK)
         single = [each for each in codec.COMMANDS.values() if not each.steps and each.many is None]
         #: The shortest time from the end of a request to the end of its answer.
         self.shortest = min(timing.deadline(each, 0) for each in single if each.response)
-        self._commands = [each for each in single if timing.deadline(each, 0) <= self.shortest + NEAR]
+        near = [each for each in single if timing.deadline(each, 0) <= self.shortest + NEAR]
+        self._commands = [each for each in near if names is None or snake(each.name) in names]
         self._command = self._commands[0]
 
     def next(self) -> Any:
@@ -137,8 +148,13 @@ class Traffic:
         return varied
 
 
-def run(name: str, transactions: int, seed: int, *, asynchronous: bool = False) -> Outcome:
-    """Perform transactions of a protocol with two nodes, and a third one that is missing."""
+def run(
+    name: str, transactions: int, seed: int, *, asynchronous: bool = False, in_c: bool = False
+) -> Outcome:
+    """Perform transactions of a protocol with two nodes, and a third one that is missing.
+
+    ``in_c``: the master is that in C.
+    """
     module, codec = bus_of(name), codec_of(name)
     prefix = "Async" if asynchronous else ""
     made = next(each for each in ("Bus", "Device", "Peer") if hasattr(module, each))
@@ -147,7 +163,8 @@ def run(name: str, transactions: int, seed: int, *, asynchronous: bool = False) 
     first = codec.BUS.first_node
     numbers = [0] if first is None else [first, first + 1]
     nodes = [Witness(codec, number, rng) for number in numbers]
-    traffic = Traffic(codec, rng, [*numbers * 9, numbers[-1] + 1])
+    known = {each.name for each in asks_of(described(name).model)} if in_c else None
+    traffic = Traffic(codec, rng, [*numbers * 9, numbers[-1] + 1], known)
     late = (SHARE, traffic.shortest + LATE[0], traffic.shortest + LATE[1])
     plan = FaultPlan(**rates, flip=(SHARE, *BITS), late=late, seed=seed)
     outcome = Outcome(name)
@@ -156,6 +173,8 @@ def run(name: str, transactions: int, seed: int, *, asynchronous: bool = False) 
         asyncio.Runner() as runner,
         join(getattr(module, prefix + made), *nodes, faults=plan, slack=SLACK, **options) as pair,
     ):
+        if in_c:
+            pair.master.engine = CMaster(described(name).model, codec, pair.master.engine.timing)
         for _ in range(transactions):
             for node in nodes:
                 node.made.clear()
@@ -188,10 +207,11 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     wrong = 0
-    for name in NAMES:
+    for name, in_c in [*((name, False) for name in NAMES), *((name, True) for name in NAMES_IN_C)]:
         begun = time.monotonic()
-        outcome = run(name, arguments.transactions, arguments.seed)
-        print(f"{outcome}; {time.monotonic() - begun:.0f} s", flush=True)
+        outcome = run(name, arguments.transactions, arguments.seed, in_c=in_c)
+        where = ", master in C" if in_c else ""
+        print(f"{outcome}{where}; {time.monotonic() - begun:.0f} s", flush=True)
         for each in outcome.wrong[:3]:
             print("  ", each)
         wrong += len(outcome.wrong)

@@ -16,6 +16,7 @@ from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.master_asks import Asks, AskView, Unasked
 from qlinkgen.backends.c.names import Names
 from qlinkgen.backends.c.tidy import tidy
+from qlinkgen.backends.c.views import PartsView
 from qlinkgen.backends.templates import environment
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.naming import file_stem
@@ -34,11 +35,11 @@ class BusView:
     Attributes:
         longest: bits of the longest frame with a command.
         quiet: bits of the silence after a failed attempt.
-        encode: the arguments of the function that encodes a received frame again, up to the payload.
         direction: the argument with which a receiver expects answers, "" without one.
         broadcast: the condition that a request is to all nodes, "" where none is.
         silence: only a silence ends a frame.
         idle: receivers need a silence between two frames, whatever ends one.
+        pending: the condition that an inserted byte may follow the frame just received, "" where none can.
         rescans: one byte can produce several events.
         checked: the function that checks the contents of an answer.
     """
@@ -51,11 +52,11 @@ class BusView:
     longest: int
     quiet: int
     byte: int
-    encode: str
     direction: str
     broadcast: str
     silence: bool
     idle: bool
+    pending: str
     rescans: bool
     checked: str
 
@@ -105,8 +106,6 @@ def why_not(plan: Plan, section: FrameSection) -> str:
         return "both sides of the link ask; use the dispatcher of the codec header and keep the deadlines"
     if section.slave_only:
         return "packets are split by their requests; use the functions of the codec header"
-    if "frame_public" not in section.templates:
-        return "frames are told by a marker bit; use the dispatcher of the codec header"
     if plan.asked or any(each.turned for each in plan.messages):
         return "only their request or turn tells some answers apart; use the dispatcher of the codec header"
     if plan.frame.idle is not None and plan.frame.idle.broken:
@@ -121,9 +120,6 @@ def bus_view(plan: Plan, names: Names, section: FrameSection) -> BusView:
     protocol, view, idle = plan.protocol, section.view, plan.frame.idle
     bits = protocol.bus.bits_per_byte
     messages = [plan.by_name[message.name] for command in plan.commands for message in command.messages]
-    way = f"{names.upper}_REQUEST, " if plan.directed else ""
-    parts = "&frame->parts, " if view.has_values else ""
-    address = f"frame->{view.address}, " if view.address else ""
     return BusView(
         address=view.address,
         address_type=view.address_type,
@@ -133,16 +129,24 @@ def bus_view(plan: Plan, names: Names, section: FrameSection) -> BusView:
         longest=max(each.wire_size for each in messages) * bits,
         quiet=QUIET_BYTES * bits,
         byte=bits,
-        encode=f"{way}frame->{view.id}, {address}{parts}",
         direction=f", {names.upper}_RESPONSE" if view.needs_direction else "",
         broadcast=f"job->{view.address} == {names.upper}_BROADCAST"
         if view.address and protocol.bus.broadcast is not None
         else "",
         silence=idle is not None and idle.alone,
         idle=idle is not None,
+        pending=_pending(section, names.upper),
         rescans=section.rescans,
         checked=f"{names.prefix}_response_check",
     )
+
+
+def _pending(section: FrameSection, upper: str) -> str:
+    if section.receiver == "receiver_streamed":
+        return f"bus->receiver.state == {upper}_FIRST_"
+    parts = section.views.get("parts")
+    late = section.rescans and isinstance(parts, PartsView) and parts.late_insert
+    return "bus->receiver.due >= 0" if late else ""
 
 
 __all__ = ["generate", "why_not"]
