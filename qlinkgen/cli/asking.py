@@ -18,7 +18,6 @@ from qlinkgen.cli.wire_options import (
     echo_mode,
     echo_option,
     line_of,
-    matching,
     open_free,
     open_usual,
     parity_option,
@@ -29,6 +28,7 @@ from qlinkgen.link.events import Event
 from qlinkgen.link.host import HostEngine
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.protocols.registry import support_of
 from qlinkgen.transport.blocking import BlockingMaster
 from qlinkgen.transport.conversation import timing_of
 from qlinkgen.transport.port import Port
@@ -63,7 +63,6 @@ def asking_options(command: Callable[..., R]) -> Callable[..., R]:
 @contextlib.contextmanager
 def master_at(  # what a master consists of
     port: str,
-    name: str,
     protocol: Protocol,
     codec: ModuleType,
     asking: Asking,
@@ -75,7 +74,6 @@ def master_at(  # what a master consists of
 
     Args:
         port: name of the port.
-        name: PROTOCOL, as given.
         protocol: the protocol.
         codec: its module.
         asking: the options.
@@ -87,7 +85,8 @@ def master_at(  # what a master consists of
     """
     with _opened(port, protocol, codec, asking) as opened:
         timing = timing_of(codec, opened, slack=asking.slack, attempts=attempts)
-        engine = MasterEngine(codec, timing, echo=echo_mode(protocol, asking.echo), accepts=matching(name))
+        accepts = support_of(protocol).accepts()
+        engine = MasterEngine(codec, timing, echo=echo_mode(protocol, asking.echo), accepts=accepts)
         yield engine, BlockingMaster(engine, opened, on_event=on_event)
 
 

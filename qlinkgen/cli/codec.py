@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping, Sequence
 from types import ModuleType
 from typing import Protocol as Shape
 
-from qlinkgen._resources import schemas_dir
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import did_you_mean
 from qlinkgen.link import codec as link
@@ -17,6 +15,7 @@ from qlinkgen.model.naming import address_attribute, attribute
 from qlinkgen.model.objects import attributes_of
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import BadValue, Json, Native, to_json
+from qlinkgen.protocols.registry import codec_of
 
 
 class MessageObject(link.Message, Shape):
@@ -36,20 +35,12 @@ def load_codec(protocol: Protocol, *, plain: bool = False, only: str = "") -> Mo
     ``plain``: the protocol is as its schema says, without another checksum; then the module in the package
     is taken if there is one of this very schema.
     """
-    if plain and not protocol.version and (kept := _in_package(protocol)) is not None:
+    if plain and (kept := codec_of(protocol)) is not None:
         return kept
     from qlinkgen.backends.python import load  # noqa: PLC0415  # Jinja is slow to import
     from qlinkgen.plan import Options  # noqa: PLC0415  # not needed for the module in the package
 
     return load(protocol, Options(only=(only,) if only else ()), laid_out=False)
-
-
-def _in_package(protocol: Protocol) -> ModuleType | None:
-    """Return the module of a shipped protocol, None if it is of another schema."""
-    if not (schemas_dir() / f"{protocol.name}.yaml").is_file():
-        return None
-    module = importlib.import_module(f"qlinkgen.codecs.{protocol.name}")
-    return module if protocol.schema_hash in (module.__doc__ or "") else None
 
 
 def build(

@@ -95,7 +95,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     address = _address(loaded, commands, node)
     codec = load_codec(loaded)
     cases = Cases(plan_of(loaded), codec, commands, address, seed, everything=everything)
-    with master_at(port, protocol, loaded, codec, asking) as (engine, master):
+    with master_at(port, loaded, codec, asking) as (engine, master):
         probe = _probe(codec, cases)
         bench = Bench(engine, master, probe)
         if not bench.is_there():

@@ -8,9 +8,7 @@ from enum import Enum
 import click
 from click.core import ParameterSource
 
-from qlinkgen._resources import schemas_dir
 from qlinkgen.cli.boundary import Failure
-from qlinkgen.cli.common import find_schema
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan.ends import Gaps, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.framing import frame_plan
@@ -33,20 +31,9 @@ _IS: Mapping[Kind, str] = {
     HOST: "has one host and one device",
 }
 _WITH: Mapping[Kind, str] = {BUS: "a bus with a master", RING: "a ring", HOST: "a host with one device"}
-_SHIPPED: Mapping[str, Kind] = {"qlink": BUS, "trio": RING, "mc1231a": HOST}
 
 #: Option, by parameter name, to the kinds that it applies to; options not listed apply to all.
 Belongs = Mapping[str, Collection[Kind]]
-
-
-def is_shipped(name: str, which: str) -> bool:
-    """Whether a PROTOCOL is that shipped one, so that its specific code can be used."""
-    return name == which or find_schema(name).resolve() == (schemas_dir() / f"{which}.yaml").resolve()
-
-
-def shipped_kind(name: str) -> tuple[str, Kind] | None:
-    """Return name and kind of a PROTOCOL if it is a shipped one."""
-    return next(((each, kind) for each, kind in _SHIPPED.items() if is_shipped(name, each)), None)
 
 
 def kind_of(protocol: Protocol) -> Kind:

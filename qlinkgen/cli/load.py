@@ -10,8 +10,7 @@ import click
 
 from qlinkgen.cli.arguments import driven_protocol_argument, port_argument
 from qlinkgen.cli.boundary import INTERRUPTED, USAGE, WRONG, Failure
-from qlinkgen.cli.common import crc_option, on_terminal
-from qlinkgen.cli.kinds import is_shipped
+from qlinkgen.cli.common import crc_option, load_protocol, on_terminal
 from qlinkgen.cli.wire_options import (
     attempts_option,
     baud_option,
@@ -30,6 +29,7 @@ from qlinkgen.model.replacement import Replacement
 from qlinkgen.protocols.qlink import Bus, LoadProgress
 from qlinkgen.protocols.qlink.facts import BAUD
 from qlinkgen.protocols.qlink.hexfile import read_hex
+from qlinkgen.protocols.registry import support_of
 
 Show = Callable[[LoadProgress], None]
 
@@ -78,7 +78,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     \b
     qlinkgen load qlink /dev/ttyUSB0 --node 3 program.hex
     """  # noqa: D301  # click takes the character \b for "do not wrap"
-    if not is_shipped(protocol, "qlink"):
+    if not support_of(load_protocol(protocol)).loads:
         raise Failure(f"{protocol} has no procedure that loads a program; qlink has one")
     text = _text(file)
     with_crc(qlink, qlink.Codec, crc)

@@ -19,7 +19,6 @@ from qlinkgen.cli.wire_options import (
     Parity,
     baud_option,
     line_of,
-    matching,
     open_free,
     open_usual,
     parity_option,
@@ -29,6 +28,7 @@ from qlinkgen.cli.wire_options import (
 )
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.replacement import Replacement
+from qlinkgen.protocols.registry import support_of
 
 BELONGS: Belongs = {"slack": (BUS,)}
 
@@ -98,7 +98,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     codec = load_codec(loaded)
     if capture is not None:
         return _of_capture(
-            protocol, loaded, codec, capture, as_json=as_json, raw=raw, count=count, baud=baud, slack=slack
+            loaded, codec, capture, as_json=as_json, raw=raw, count=count, baud=baud, slack=slack
         )
     assert port is not None  # one of both is given
     line = line_of(parity, stop_bits)
@@ -119,13 +119,12 @@ def command(  # noqa: PLR0917  # click passes them by name
 
             monitor_bus(
                 loaded, codec, opened, signals, as_json=as_json, raw=raw, count=count, end=end, slack=slack,
-                accepts=matching(protocol), listener=listener,
+                accepts=support_of(loaded).accepts(), listener=listener,
             )  # fmt: skip
     return None
 
 
 def _of_capture(
-    name: str,
     protocol: Protocol,
     codec: ModuleType,
     capture: str,
@@ -148,5 +147,5 @@ def _of_capture(
 
     return monitor_capture(
         protocol, codec, capture, as_json=as_json, raw=raw, count=count, baud=speed, slack=slack,
-        accepts=matching(name),
+        accepts=support_of(protocol).accepts(),
     )  # fmt: skip

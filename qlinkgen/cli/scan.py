@@ -23,7 +23,7 @@ from qlinkgen.cli.codec import fields, load_codec
 from qlinkgen.cli.common import crc_option, load_protocol, on_terminal, warn
 from qlinkgen.cli.decode import message_record
 from qlinkgen.cli.encode import compose
-from qlinkgen.cli.kinds import BUS, is_shipped, kind_of
+from qlinkgen.cli.kinds import BUS, kind_of
 from qlinkgen.cli.send_bus import check_request
 from qlinkgen.cli.tables import Table
 from qlinkgen.cli.wire_options import parse_nodes
@@ -35,12 +35,11 @@ from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.replacement import Replacement
 from qlinkgen.model.transaction import Command
 from qlinkgen.model.values import Json
+from qlinkgen.protocols.registry import support_of
+from qlinkgen.protocols.support import Question
 
 #: More nodes are asked only if they are given: each silent one takes a deadline.
 MOST = 256
-
-#: A command and its values, as for encode.
-Question = tuple[str, tuple[str, ...]]
 
 
 @click.command("scan")
@@ -86,7 +85,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     asked = [_asker(loaded, codec, question, numbers[0]) for question in questions]
     with (
         _progress() as show,
-        master_at(port, protocol, loaded, codec, asking, on_event=show) as (_, master),
+        master_at(port, loaded, codec, asking, on_event=show) as (_, master),
     ):
         found = master.run(survey(numbers, (asked[0], *asked), lambda each: each))
     if not found:
@@ -115,10 +114,8 @@ def _numbers(protocol: Protocol, text: str | None) -> list[int]:
 
 def questions_of(name: str, protocol: Protocol) -> Sequence[Question]:
     """Return the requests that every node of a PROTOCOL may be asked without consequences."""
-    if is_shipped(name, "qlink"):
-        from qlinkgen.protocols.qlink.survey import QUESTIONS  # noqa: PLC0415  # only for Q.link
-
-        return QUESTIONS
+    if written := support_of(protocol).questions():
+        return written
     known = [each for each in protocol.commands if _is_question(each)]
     if not known:
         raise Failure(

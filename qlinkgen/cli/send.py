@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from types import ModuleType
 from typing import Literal
 
 import click
@@ -17,7 +16,7 @@ from qlinkgen.cli.arguments import (
 from qlinkgen.cli.boundary import FINE, Failure
 from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.encode import address_option, compose, json_option
-from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, is_shipped, kind_of
+from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, check_options, kind_of
 from qlinkgen.cli.send_bus import check_request, further_of, send_on_bus
 from qlinkgen.cli.tracing import record_option, trace_of, trace_option
 from qlinkgen.cli.wire_options import (
@@ -26,13 +25,13 @@ from qlinkgen.cli.wire_options import (
     baud_option,
     echo_option,
     line_of,
-    matching,
     parity_option,
     seconds,
     slack_option,
     stop_bits_option,
 )
 from qlinkgen.model.replacement import Replacement
+from qlinkgen.protocols.registry import codec_of, support_of
 
 BELONGS: Belongs = {
     "attempts": (BUS, HOST),
@@ -162,7 +161,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     loaded = load_protocol(protocol, crc)
     kind = kind_of(loaded)
     check_options(loaded.name, kind, BELONGS)
-    own = _own_codec(protocol, kind)
+    own = codec_of(loaded) if kind is HOST else None  # what is written by hand uses its classes
     codec, found, request = compose(loaded, message, assignments, addresses, object_, codec=own)
     if kind is not RING:
         check_request(loaded, found)
@@ -189,14 +188,6 @@ def command(  # noqa: PLR0917  # click passes them by name
         further = further_of(loaded, codec, found, addresses, then)
         return send_on_bus(
             loaded, codec, request, port, further=further, baud=baud, line=line,
-            attempts=attempts, slack=slack, echo=echo, accepts=matching(protocol), count=count, every=every,
+            attempts=attempts, slack=slack, echo=echo, accepts=support_of(loaded).accepts(),
+            count=count, every=every,
         )  # fmt: skip
-
-
-def _own_codec(name: str, kind: Kind) -> ModuleType | None:
-    """Return the module of a chip set, for --check; None for others, which have one of their own."""
-    if kind is not HOST or not is_shipped(name, "mc1231a"):
-        return None
-    from qlinkgen.codecs import mc1231a  # noqa: PLC0415  # only for a chip set
-
-    return mc1231a

@@ -13,11 +13,9 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.decode import message_record
 from qlinkgen.cli.hosting import rules_of, selected_packet
 from qlinkgen.cli.wire_options import Line, open_free
-from qlinkgen.codecs import mc1231a
 from qlinkgen.link.codec import Framed
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.protocols.mc1231a import updating
-from qlinkgen.protocols.mc1231a.facts import AXES
+from qlinkgen.protocols.registry import support_of
 from qlinkgen.transport.blocking import BlockingMaster
 
 
@@ -37,7 +35,10 @@ def send_to_device(
 ) -> None:
     """Select what is to be selected, send the packet, and print the response."""
     packet = selected_packet(protocol, rules_of(protocol, codec), request, axis, given=f"--axis {axis}")
-    axes = _checked_axes(request, axis) if check else []
+    try:
+        verify = support_of(protocol).check_after(request, axis) if check else None
+    except ValueError as error:
+        raise Failure(str(error)) from None
     with open_free(protocol, port, baud, line) as opened:
         host = BlockingMaster(
             make_host(codec, opened, checksum=checksum, attempts=attempts, slack=slack), opened
@@ -46,16 +47,5 @@ def send_to_device(
         # Otherwise the host did not wait for a response.
         if response is not None and (checksum == "always" or response.FIELDS):
             click.echo(jsonlines.line(message_record(protocol, response)))
-        for each in axes:
-            host.run(updating.raise_command_error(each))
-
-
-def _checked_axes(request: Framed, axis: int | None) -> list[int]:
-    """Return the axes whose status word is to be read."""
-    if not isinstance(request, mc1231a.Request):
-        raise Failure("--check reads the status word of mc1231a; omit it")
-    if axis is not None:
-        return [axis]
-    if isinstance(request, mc1231a.MultiUpdateRequest):
-        return [each for each in AXES if request.axes >> (each - 1) & 1]
-    raise Failure("--check reads the status word of an axis; add --axis 1 or --axis 2")
+        if verify is not None:
+            host.run(verify)

@@ -68,7 +68,7 @@ def command(  # noqa: PLR0917  # click passes them by name
             host = ended.enter_context(host_at(port, loaded, codec, asking, attempts=attempts))
             lines = Lines(loaded, codec, host[1], number, host[0].rules)
         else:
-            bus = ended.enter_context(master_at(port, protocol, loaded, codec, asking, attempts=attempts))
+            bus = ended.enter_context(master_at(port, loaded, codec, asking, attempts=attempts))
             lines = Lines(loaded, codec, bus[1], number)
         on_terminal = on_terminal_input()
         fine = perform_all(lines, _editor(loaded, lines) if on_terminal else _piped)

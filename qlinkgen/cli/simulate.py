@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Literal
 
 import click
 
 from qlinkgen.cli.arguments import protocol_argument
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import crc_option, load_protocol
-from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, kind_of, shipped_kind
+from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, kind_of
 from qlinkgen.cli.simulating import plan_of
 from qlinkgen.cli.tracing import record_option, trace_option
 from qlinkgen.cli.wire_options import seconds
 from qlinkgen.model.replacement import Replacement
-
-if TYPE_CHECKING:
-    from qlinkgen.protocols.trio.basic import Pointed
+from qlinkgen.protocols.registry import support_of, supported
 
 BELONGS: Belongs = {
     **dict.fromkeys(("nodes", "echo", "refuse", "tap", "traced"), (BUS,)),
@@ -112,7 +110,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     refuse: tuple[str, ...],
     ring: str | None,
     programs: tuple[str, ...],
-    pointed: Pointed | None,
+    pointed: Literal["before", "width"] | None,
     keys: tuple[str, ...],
     closed: bool,
     length: float | None,
@@ -215,19 +213,16 @@ def command(  # noqa: PLR0917  # click passes them by name
 
 def _kind(name: str, crc: Replacement | None) -> Kind:
     """Return the kind of a protocol; refuse kinds that cannot be simulated, and options of other kinds."""
-    shipped = shipped_kind(name)
-    if shipped is not None:
-        check_options(*shipped, BELONGS)
-        return shipped[1]
     protocol = load_protocol(name, crc)
     kind = kind_of(protocol)
-    if kind is RING:
+    if kind is RING and not support_of(protocol).simulated:
+        known = " and ".join(supported(protocol.bus.kind))
         raise Failure(
             f"{protocol.name}: `qlinkgen simulate` supports your own schemas only with bus kind "
-            "master_slave, link or host; of kind ring it supports only trio"
+            f"master_slave, link or host; of kind ring it supports only {known}"
         )
     check_options(protocol.name, kind, BELONGS)
-    if not protocol.commands:
+    if kind is BUS and not protocol.commands:
         raise Failure(
             f"{protocol.name} has no commands, only messages, so its nodes have nothing to answer; "
             "use `qlinkgen send` to send its messages"

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from qlinkgen.cli.behaviour import Behaviour, Nodes
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import load_protocol
-from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.cli.simulating import port_of, run_bus, say, watch_line
 from qlinkgen.cli.wire_options import ANY_SPEED, counted, parse_nodes, with_crc
 from qlinkgen.link.codec import Codec, Framed
 from qlinkgen.link.many import has_endless
 from qlinkgen.link.slave import Node, SlaveEngine
+from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.replacement import Replacement
 from qlinkgen.plan import plan_of
-from qlinkgen.protocols.qlink.facts import NODES
+from qlinkgen.protocols.registry import codec_of, support_of
 from qlinkgen.sim import FaultPlan, Wire
 from qlinkgen.transport.conversation import OTHER_PROGRAM
 
@@ -76,35 +76,31 @@ def simulate_bus(
 def _nodes(
     name: str, nodes: str | None, crc: Replacement | None, behaviour: Behaviour
 ) -> tuple[Codec, list[Node], Mapping[type[Framed], float]]:
-    if is_shipped(name, "qlink"):
-        from qlinkgen.codecs import qlink  # noqa: PLC0415  # only for Q.link
-
+    protocol = load_protocol(name, crc)
+    numbers = _numbers(protocol, nodes)
+    written, packaged = support_of(protocol).nodes(numbers), codec_of(protocol)
+    if written is not None and packaged is not None:
         if behaviour:
             raise Failure(
-                "nodes of qlink behave as documented, and take no values; omit --value, --values, --memory, "
-                "--delay and --refuse"
+                f"nodes of {protocol.name} behave as documented, and take no values; omit --value, --values, "
+                "--memory, --delay and --refuse"
             )
-        own = _qlink_nodes(parse_nodes(nodes or "1", NODES[0], NODES[-1]))
-        return with_crc(qlink, qlink.Codec, crc), own, {}
-
-    protocol = load_protocol(name, crc)
+        return with_crc(packaged, packaged.Codec, crc), list(written), {}
     codec = load_codec(protocol)
     made = Nodes(protocol, codec, plan_of(protocol), behaviour)
-    if protocol.bus.nodes is None or protocol.address_name is None:
-        if nodes is not None:
-            raise Failure(f"the frames of {protocol.name} have no address; omit --nodes {nodes}")
+    if not numbers:
         return codec, [made.node()], made.delays
-    first, last = protocol.bus.nodes
-    numbers = parse_nodes(str(first) if nodes is None else nodes, first, last)
     return codec, [made.node(number) for number in numbers], made.delays
 
 
-def _qlink_nodes(numbers: Iterable[int]) -> list[Node]:
-    from qlinkgen.codecs.qlink import PositionType  # noqa: PLC0415
-    from qlinkgen.protocols.qlink import VirtualNode  # noqa: PLC0415  # only for Q.link
-
-    kind = PositionType.JVL_MACTALK  # a node of type none reports no position
-    return [VirtualNode(number, position_type=kind, serial_number=1000 + number) for number in numbers]
+def _numbers(protocol: Protocol, nodes: str | None) -> list[int]:
+    """Return the addresses of the nodes, none if frames have no address."""
+    if protocol.bus.nodes is None or protocol.address_name is None:
+        if nodes is not None:
+            raise Failure(f"the frames of {protocol.name} have no address; omit --nodes {nodes}")
+        return []
+    first, last = protocol.bus.nodes
+    return parse_nodes(str(first) if nodes is None else nodes, first, last)
 
 
 def _summary(engines: list[SlaveEngine]) -> str:

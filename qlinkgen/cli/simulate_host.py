@@ -9,13 +9,12 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import load_protocol
 from qlinkgen.cli.hosting import check_resync
-from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.cli.simulating import port_of, run_bus, say, watch_line
 from qlinkgen.cli.wire_options import counted
 from qlinkgen.link.device import DeviceEngine
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import plan_of
-from qlinkgen.protocols.mc1231a import ChipEngine, ChipSet
+from qlinkgen.protocols.registry import support_of
 from qlinkgen.sim import FaultPlan, Wire
 
 
@@ -33,9 +32,13 @@ def simulate_host(
     from qlinkgen.sim.pty_bus import PtyBus  # noqa: PLC0415  # needs a system that has ptys
 
     loaded = load_protocol(name)
-    chip = ChipSet() if is_shipped(name, "mc1231a") else None
-    engine = _device(loaded, behaviour) if chip is None else _chip(chip, behaviour)
-    what = "a device" if chip is None else "chip set"
+    written = support_of(loaded).device()
+    if written is not None and behaviour:
+        raise Failure(
+            f"{written.what} behaves as documented, and takes no values; omit --value, --values, --memory "
+            "and --delay"
+        )
+    engine = _device(loaded, behaviour) if written is None else written.engine
     port = port_of(listen, link, baud)
     bits = loaded.bus.bits_per_byte
     wire = Wire(
@@ -45,32 +48,20 @@ def simulate_host(
         chunks="byte" if baud is not None else "frame",
         collisions=False,  # a line for each direction
     )
-    wire.attach(engine, what)
+    wire.attach(engine, "device")
     with ExitStack() as ended:
         if record is not None:
             codec, where = load_codec(loaded), link or f"simulated {loaded.name}"
             watch_line(wire, loaded, codec, where, ended, traced=False, record=record)
-        run_bus(PtyBus(wire, link=link, port=port), link, f"{what} of {name}" if chip is None else _CHIP)
-    for number, axis in chip.axes.items() if chip else ():
-        say(f"axis {number}: position {axis.actual}, status 0x{axis.status:04X}", None)
+        run_bus(PtyBus(wire, link=link, port=port), link, written.what if written else f"a device of {name}")
+    for line in written.report() if written else ():
+        say(line, None)
     seen = engine.counters
     say(
         f"{counted(seen.packets, 'packet')} executed, {seen.illegal} illegal, "
         f"{seen.out_of_range} out of range",
         plan,
     )
-
-
-_CHIP = "an mc1231a chip set"
-
-
-def _chip(chip: ChipSet, behaviour: Behaviour) -> DeviceEngine:
-    if behaviour:
-        raise Failure(
-            f"{_CHIP} behaves as documented, and takes no values; omit --value, --values, --memory "
-            "and --delay"
-        )
-    return ChipEngine(chip)
 
 
 def _device(protocol: Protocol, behaviour: Behaviour) -> DeviceEngine:

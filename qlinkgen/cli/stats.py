@@ -22,9 +22,9 @@ from qlinkgen.cli.decoder import Decoder
 from qlinkgen.cli.filters import Filter, FilterOptions, filter_options
 from qlinkgen.cli.stats_report import Report, html, show
 from qlinkgen.cli.stats_source import heard_on_bus, messages_alone
-from qlinkgen.cli.wire_options import matching
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan.framing import frame_plan
+from qlinkgen.protocols.registry import support_of
 
 Form = Literal["text", "json", "html"]
 #: Bits per second, where neither the schema nor the user states it.
@@ -67,7 +67,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     chosen = Filter(loaded, wanted)
     for name in files:
         file = Capture(loaded, Decoder(loaded, codec, None, None, None, capture.baud), capture)
-        for seen in _seen(protocol, loaded, codec, file, name, chosen, baud):
+        for seen in _seen(loaded, codec, file, name, chosen, baud):
             statistics.take(seen)
         size += file.size
         problems.count += file.problems.count
@@ -85,7 +85,6 @@ def command(  # noqa: PLR0917  # click passes them by name
 
 
 def _seen(  # noqa: PLR0917  # one call
-    name_: str,
     protocol: Protocol,
     codec: ModuleType,
     file: Capture,
@@ -95,7 +94,9 @@ def _seen(  # noqa: PLR0917  # one call
 ) -> Iterator[Seen]:
     paired = protocol.commands and not frame_plan(protocol.frame).needs_request
     if paired and protocol.bus.kind in {"master_slave", "link"}:
-        return heard_on_bus(protocol, codec, file.records(name), chosen, baud=baud, accepts=matching(name_))
+        return heard_on_bus(
+            protocol, codec, file.records(name), chosen, baud=baud, accepts=support_of(protocol).accepts()
+        )
     return messages_alone(protocol, file.frames(name), chosen)
 
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Literal, NamedTuple, TypeVar, cast
 
 import click
 
 from qlinkgen.cli.boundary import Failure
-from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.link.echo import PROBE, EchoMode
-from qlinkgen.link.transaction import Accepts
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.replacement import Replacement
 from qlinkgen.model.values import whole_number
@@ -145,15 +143,6 @@ def echo_mode(protocol: Protocol, given: str | None) -> EchoMode:
 def counted(number: int, what: str) -> str:
     """``1 request``, ``2 requests``."""
     return f"{number} {what}{'' if number == 1 else 's'}"
-
-
-def matching(name: str) -> Mapping[str, Accepts] | None:
-    """Return the additional rules for matching responses of a PROTOCOL."""
-    if not is_shipped(name, "qlink"):
-        return None
-    from qlinkgen.protocols.qlink.matching import ACCEPTS  # noqa: PLC0415  # only for Q.link
-
-    return ACCEPTS
 
 
 def with_crc(plain: A, choose: Callable[[str], B], crc: Replacement | None) -> A | B:

@@ -52,7 +52,7 @@ def test_sending_selects_first(qlinkgen: Run, on_line: OnLine, schema: Path) -> 
     [
         (("get_rate", "--axis", "3"), "--axis 3: channel must be 1 or 2, not 3"),
         (("status", "--axis", "1"), "status does not depend on the current channel; omit --axis 1"),
-        (("get_rate", "--check"), "--check reads the status word of mc1231a; omit it"),
+        (("get_rate", "--check"), "pump has no status word known here; omit --check"),
         (("get_rate.response",), "is a response; send its request"),
     ],
 )

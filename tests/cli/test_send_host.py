@@ -6,7 +6,9 @@ import contextlib
 import json
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 
+from qlinkgen._resources import schemas_dir
 from qlinkgen.codecs import mc1231a
 from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.protocols.mc1231a import ChipEngine, ChipSet
@@ -85,3 +87,16 @@ def test_a_missing_port(qlinkgen: Run) -> None:
     result = send(qlinkgen, "/dev/not-there", "get_pos")
     assert (result.code, result.out) == (1, "")
     assert "does not exist" in result.err
+
+
+def test_a_changed_copy_has_no_status_word_to_check(qlinkgen: Run, tmp_path: Path) -> None:
+    text = (schemas_dir() / "mc1231a.yaml").read_text(encoding="utf-8")
+    copy = tmp_path / "own.yaml"
+    copy.write_text(text.replace("title: MC1231A", "title: Another"), encoding="utf-8")
+    with chip() as (path, engine):
+        result = qlinkgen("send", str(copy), path, "get_vel", "--axis", "2", "--baud", "9600", *SLACK)
+        assert json.loads(result.out) == {"message": "get_vel.response", "fields": {"value": 0.0}}
+        result = qlinkgen("send", str(copy), path, "update", "--axis", "2", "--check")
+    assert (result.code, result.out) == (2, "")
+    assert "mc1231a has no status word known here; omit --check" in result.err
+    assert engine.record == [mc1231a.Set2Request().to_frame(), mc1231a.GetVelRequest().to_frame()]

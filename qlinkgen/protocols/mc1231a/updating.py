@@ -42,8 +42,12 @@ def update(axis: int, *, check: bool) -> Procedure[mc1231a.UpdateResponse]:
 def multi_update(axes: int, *, check: bool) -> Procedure[mc1231a.MultiUpdateResponse]:
     """Update several axes; with `check`, then check each for the command error."""
     reply: Reply = yield Ask(Packet(mc1231a.MultiUpdateRequest(axes=axes)))
-    for axis in AXES if check else ():
-        if axes >> (axis - 1) & 1:
-            yield from raise_command_error(axis)
+    for axis in axes_in(axes) if check else ():
+        yield from raise_command_error(axis)
     response: mc1231a.MultiUpdateResponse = reply.response
     return response
+
+
+def axes_in(mask: int) -> list[int]:
+    """Return the axes of a mask."""
+    return [axis for axis in AXES if mask >> (axis - 1) & 1]
