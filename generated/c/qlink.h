@@ -34,13 +34,19 @@
  *
  * void board_received(uint8_t byte)
  * {
- *     uint8_t answer[QLINK_MAX_WIRE_SIZE];
- *     if (qlink_receive(&receiver, byte) == QLINK_EVENT_FRAME) {
- *         const qlink_frame_t frame = qlink_receiver_frame(&receiver);
- *         const size_t size = qlink_slave_dispatch(&slave, &frame, answer, sizeof answer);
- *         if (size > 0U) {
- *             board_send(answer, size);
+ *     static uint8_t answer[QLINK_MAX_WIRE_SIZE];
+ *     static size_t size;
+ *     const qlink_event_t event = qlink_receive(&receiver, byte);
+ *     if (event != QLINK_EVENT_NONE) {
+ *         size = 0U;
+ *         if (event == QLINK_EVENT_FRAME) {
+ *             const qlink_frame_t frame = qlink_receiver_frame(&receiver);
+ *             size = qlink_slave_dispatch(&slave, &frame, answer, sizeof answer);
  *         }
+ *     }
+ *     if ((size > 0U) && !qlink_receiver_pending(&receiver)) {
+ *         board_send(answer, size);
+ *         size = 0U;
  *     }
  * }
  *
@@ -2283,6 +2289,13 @@ static inline qlink_event_t qlink_receive(qlink_receiver_t *receiver, uint8_t by
     return QLINK_EVENT_FRAME;
 }
 
+/* Whether bytes are due before the line is free: the byte inserted after the last one of a frame, or the rest of a
+ * frame that has begun. A slave answers once it is false. */
+static inline bool qlink_receiver_pending(const qlink_receiver_t *receiver)
+{
+    return receiver->state != QLINK_HUNTING_;
+}
+
 /* ---- Transactions ----
  * _ANSWERED: 1 if the slave responds. _IN_FLIGHT: maximum number of outstanding requests. */
 
@@ -2852,7 +2865,7 @@ static inline int qlink_handle_any_(qlink_slave_t *slave, const qlink_frame_t *f
 }
 
 /* Handles a request; returns the size of the response in `wire`, 0 if there is none. `wire` needs up to
- * QLINK_MAX_WIRE_SIZE bytes, and must not overlap the frame. */
+ * QLINK_MAX_WIRE_SIZE bytes, and must not overlap the frame. Send it once qlink_receiver_pending is false. */
 static inline size_t qlink_slave_dispatch(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {

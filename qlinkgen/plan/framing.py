@@ -134,6 +134,13 @@ class FramePlan:
         return {member.name: member for each in self.every for _, member in each.envelope.values}
 
     @property
+    def late_insert(self) -> bool:
+        """Whether a byte may follow that is inserted after the last one of a frame; receivers do not wait."""
+        return any(
+            isinstance(each.transparency, FrameStuffing) and not each.transparency.back for each in self.every
+        )
+
+    @property
     def search(self) -> Mapping[str, object]:
         """What one receiver needs to find the frames of both directions, by its name in error messages."""
         envelope, end, way = self.envelope, self.end, self.transparency

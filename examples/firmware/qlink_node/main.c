@@ -21,12 +21,12 @@ static bool receive_within(uint8_t *byte, uint32_t milliseconds)
     return true;
 }
 
-/* A frame is complete with its check value. If that ends with the preamble byte, the master still sends the byte
- * inserted after it: the answer waits for that byte. */
+/* A frame is complete with its check value. The master may still send a byte inserted after it: the answer waits for
+ * that byte. */
 static void wait_for_inserted(void)
 {
     uint8_t byte;
-    if (receive_within(&byte, BYTE_MS)) {
+    if (qlink_receiver_pending(&node.receiver) && receive_within(&byte, BYTE_MS)) {
         (void)node_receive(&node, byte); /* a single byte completes no frame */
     }
 }
@@ -48,12 +48,9 @@ static void drop_echo(size_t size)
 }
 #endif
 
-static void send_answer(uint8_t last, size_t size)
+static void send_answer(size_t size)
 {
-    const uint8_t preamble = answer[0]; /* every frame begins with it */
-    if (last == preamble) {
-        wait_for_inserted();
-    }
+    wait_for_inserted();
     board_send(answer, size);
 #if BOARD_HEARS_ITSELF
     drop_echo(size);
@@ -69,7 +66,7 @@ static void advance(uint32_t now)
 
 /* The answer has to begin within three byte times, so the time is not updated once more before it, unless so many bytes
  * were received at once that ticks were missed. */
-static void answer_frame(uint8_t last)
+static void answer_frame(void)
 {
     const uint32_t now = board_milliseconds();
     size_t size;
@@ -79,7 +76,7 @@ static void answer_frame(uint8_t last)
     size = node_answer(&node, answer);
     board_outputs(node.io.outputs);
     if (size > 0u) {
-        send_answer(last, size);
+        send_answer(size);
     }
 }
 
@@ -93,7 +90,7 @@ int main(void)
             advance(board_milliseconds());
             board_wait();
         } else if (node_receive(&node, byte)) {
-            answer_frame(byte);
+            answer_frame();
         } else {
             /* the frame is not complete */
         }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from qlinkgen.backends.c.crc import CheckView, CrcView
@@ -80,15 +81,7 @@ def _slave(
         "",
         "void board_send(const uint8_t *bytes, size_t size);",
         "",
-        *_receive(
-            p,
-            section,
-            ["uint8_t answer[{P}_MAX_WIRE_SIZE];"],
-            "const size_t size = {p}_slave_dispatch(&slave, &frame, answer, sizeof answer);",
-            "if (size > 0U) {{",
-            "    board_send(answer, size);",
-            "}}",
-        ),
+        *(_answered_later(p, section) if section.pending else _answered(p, section)),
         "",
         "void board_start(void)",
         "{",
@@ -151,9 +144,47 @@ def _numbers(message: MessagePlan) -> list[str]:
     return [each.name for each in steps if not is_wide(each.number)]
 
 
+def _answered(prefix: str, section: FrameSection) -> list[str]:
+    return _receive(
+        prefix,
+        section,
+        ["uint8_t answer[{P}_MAX_WIRE_SIZE];"],
+        "const size_t size = {p}_slave_dispatch(&slave, &frame, answer, sizeof answer);",
+        "if (size > 0U) {{",
+        "    board_send(answer, size);",
+        "}}",
+    )
+
+
+def _answered_later(prefix: str, section: FrameSection) -> list[str]:
+    """The answer waits for the byte that may be inserted after the frame; another event makes it void."""
+    handled = [
+        "if (event == {P}_EVENT_FRAME) {{",
+        "    const {p}_frame_t frame = {p}_receiver_frame(&receiver);",
+        "    size = {p}_slave_dispatch(&slave, &frame, answer, sizeof answer);",
+        "}}",
+    ]
+    again = ["event = {p}_receiver_next(&receiver);"] if section.rescans else []
+    lines = [
+        "static uint8_t answer[{P}_MAX_WIRE_SIZE];",
+        "static size_t size;",
+        ("" if again else "const ") + "{p}_event_t event = {p}_receive(&receiver, byte);",
+        ("while" if again else "if") + " (event != {P}_EVENT_NONE) {{",
+        *(f"    {line}" for line in ["size = 0U;", *handled, *again]),
+        "}}",
+        "if ((size > 0U) && !{p}_receiver_pending(&receiver)) {{",
+        "    board_send(answer, size);",
+        "    size = 0U;",
+        "}}",
+    ]
+    return _written(
+        prefix, ["void board_received(uint8_t byte)", "{{", *(f"    {each}" for each in lines), "}}"]
+    )
+
+
 def _receive(prefix: str, section: FrameSection, declared: list[str], *handled: str) -> list[str]:
     """A function that processes a received byte, for an interrupt or a loop; and one for a silence."""
-    upper, rescans = prefix.upper(), section.rescans
+    rescans = section.rescans
     call = "{p}_rx_idle(&receiver)" if section.gaps else "{p}_receive(&receiver, byte)"
     test = "while (event != {P}_EVENT_NONE) {{" if rescans else f"if ({call} == {{P}}_EVENT_FRAME) {{{{"
     body = ["const {p}_frame_t frame = {p}_receiver_frame(&receiver);", *handled]
@@ -170,6 +201,11 @@ def _receive(prefix: str, section: FrameSection, declared: list[str], *handled: 
     if section.gaps:
         taken = ["    (void){p}_receive(&receiver, byte);", "}}", "", "void board_idle(void)", "{{"]
         lines = [*lines[:2], *taken, *lines[2:]]
+    return _written(prefix, lines)
+
+
+def _written(prefix: str, lines: Sequence[str]) -> list[str]:
+    upper = prefix.upper()
     return [
         line.replace("{p}", prefix).replace("{P}", upper).replace("{{", "{").replace("}}", "}")
         for line in lines

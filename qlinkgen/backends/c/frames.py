@@ -85,6 +85,11 @@ class FrameSection:
         return self.receiver == "receiver_gap"
 
     @property
+    def pending(self) -> bool:
+        """Whether a byte of a frame may be due after the receiver has found the frame complete."""
+        return self.plan.frame.late_insert
+
+    @property
     def slave_only(self) -> bool:
         """Whether only slaves have a receiver, because splitting responses needs their requests."""
         return self.plan.frame.needs_request

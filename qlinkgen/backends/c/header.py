@@ -299,6 +299,7 @@ class Header:
             "dispatch",
             f=section.view,
             d=section.dispatch,
+            pending=section.pending,
             example_command=snake(answered.name).upper() if answered else "",
             slave=slave,
             replies=self._replies(slave),

@@ -491,9 +491,9 @@ def seeds_of(plan: Plan) -> tuple[tuple[str, bytes], ...]:
 
 def parts_view(writer: PartWriter, max_wire: int) -> PartsView:
     """The view of the parts of a frame."""
-    envelope, receiver, stuffing = writer.envelope, writer.frame.receiver, writer.stuffing
+    envelope, receiver = writer.envelope, writer.frame.receiver
     return PartsView(
-        late_insert=isinstance(receiver, Rescan) and stuffing is not None and not stuffing.back,
+        late_insert=isinstance(receiver, Rescan) and writer.frame.late_insert,
         judged="true" if isinstance(receiver, Rescan) and not receiver.verified else "",
         head=writer.head,
         tail=envelope.trailer_size,
