@@ -24,6 +24,7 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.capture_options import CaptureOptions
 from qlinkgen.cli.decoder import Decoder
 from qlinkgen.cli.hex_text import HexError, HexReader
+from qlinkgen.cli.progress import Progress, progress
 from qlinkgen.cli.streams import Bad
 from qlinkgen.cli.traffic import Placed, Sides, Traffic, sides_of, source_of
 from qlinkgen.errors import CaptureError
@@ -59,15 +60,18 @@ class _Chosen(NamedTuple):
 
 
 @contextmanager
-def _opened(name: str, problems: Problems) -> Iterator[io.BufferedReader]:
+def _opened(name: str, problems: Problems) -> Iterator[tuple[io.BufferedReader, Progress]]:
     """Open a file, or standard input for -, as it was before it was compressed."""
     if name == "-":
-        yield opened(sys.stdin.buffer, problems)
+        yield opened(sys.stdin.buffer, problems), Progress()
         return
     if Path(name).is_dir():
         raise Failure(f"'{name}' is a folder; name a file of it")
-    with open(name, "rb", buffering=_HEAD) as file:  # noqa: PTH123  # the buffer is what detection sees
-        yield opened(file, problems)
+    with (
+        open(name, "rb", buffering=_HEAD) as file,  # noqa: PTH123  # the buffer is what detection sees
+        progress(file, name) as shown,
+    ):
+        yield opened(file, problems), shown
 
 
 class Capture:
@@ -86,25 +90,24 @@ class Capture:
 
     def frames(self, name: str) -> Iterator[Placed]:
         """Return the frames of a file, or of standard input for -."""
-        with _opened(name, self.problems) as file:
+        with _opened(name, self.problems) as (file, shown):
             chosen = self._chosen(file, live=name == "-")
             traffic = self._decoder.traffic(chosen.sides, exact=chosen.reader.exact)
-            yield from traffic.decode(self._read(chosen, file))
+            yield from traffic.decode(self._read(chosen, file, shown))
 
     def records(self, name: str) -> Iterator[Record]:
         """Return the bytes of a file as they were captured."""
-        with _opened(name, self.problems) as file:
-            yield from self._read(self._chosen(file, live=False), file)
+        with _opened(name, self.problems) as (file, shown):
+            yield from self._read(self._chosen(file, live=False), file, shown)
 
     def _chosen(self, file: io.BufferedReader, *, live: bool) -> _Chosen:
         return _choose(self._protocol, file, self._readers(file, live=live), self._decoder)
 
-    def _read(self, chosen: _Chosen, file: io.BufferedReader) -> Iterator[Record]:
-        return map(self._counted, chosen.reader.read(file, self.problems))
-
-    def _counted(self, record: Record) -> Record:
-        self.size += len(record.data)
-        return record
+    def _read(self, chosen: _Chosen, file: io.BufferedReader, shown: Progress) -> Iterator[Record]:
+        for record in chosen.reader.read(file, self.problems):
+            self.size += len(record.data)
+            shown.update()
+            yield record
 
     def _readers(self, file: io.BufferedReader, *, live: bool) -> list[_Reader]:
         """Return the readers that the file can have, the likeliest first."""

@@ -7,6 +7,7 @@ import itertools
 import json
 import random
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -307,3 +308,17 @@ def test_what_explain_takes(qlinkgen: Run, tmp_path: Path, arguments: tuple[str,
     done = qlinkgen("explain", "qlink", *(each.format(file=file) for each in arguments))
     assert done.code == 2
     assert said in done.err
+
+
+def test_a_bar_on_a_terminal(qlinkgen: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only for long files, and only where the output goes elsewhere."""
+    file, tables = tmp_path / "capture", tmp_path / "tables"
+    file.write_bytes(b"".join(each.data for each in exchanges(200)))
+    assert "100%" not in qlinkgen("export", "qlink", file, "-o", tables).err
+    monkeypatch.setattr("qlinkgen.cli.progress.LONG", 1)
+    monkeypatch.setattr("qlinkgen.cli.progress.STEP", 1)
+    assert "100%" not in qlinkgen("export", "qlink", file, "-o", tables).err
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    assert "100%" in qlinkgen("export", "qlink", file, "-o", tables).err
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    assert "100%" not in qlinkgen("export", "qlink", file, "-o", tables).err
