@@ -241,6 +241,18 @@ def small_host(commands: str, bus: str = "") -> tuple[Any, Any]:
     return codec, loaded(model, codec)
 
 
+def test_frames_of_a_host_of_parts() -> None:
+    """Their requests have no class of their own."""
+    parts = "{id: {role: message, type: u8}, n: {type: u8, counts: data}, data: {role: payload, size: 0..4}}"
+    packet = HOST_SCHEMA[HOST_SCHEMA.index("  packet:") : HOST_SCHEMA.index("bus:")]
+    text = HOST_SCHEMA.replace(packet, f"  parts: {parts}\n").replace("BUS", "")
+    text = text.replace("COMMANDS", "commands: {go: {id: 1, request: {}, response: {}}}")
+    model, faults = loads(text, "small_host.yaml")
+    assert model, faults
+    made = loaded(model, load(model))
+    assert made.__all__ == ["AsyncHostCalls", "HostCalls", "SlaveHandlers"]
+
+
 def test_a_host_of_a_device_without_axes() -> None:
     codec, made = small_host("commands: {go: {id: 1, request: {axis: u16}, response: {}}}")
     assert made.__all__ == ["AsyncHostCalls", "HostCalls", "SlaveHandlers"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol as Protocol_
 
@@ -24,6 +24,7 @@ from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import Command, Reply, Selection, Unknown
 from qlinkgen.model.types import Enum
 from qlinkgen.plan import MessagePlan, Plan
+from qlinkgen.plan.ends import InStep
 from qlinkgen.plan.hosts import selection_of
 from qlinkgen.plan.payload import BytesStep, Holder, RecordsStep, RecordStep, by_slot
 
@@ -50,6 +51,8 @@ class Caller:
     #: Its objects represent one address or what is selected, and hold its number.
     one: bool
     methods: list[Method]
+    #: The class of requests.
+    request: str = "Message"
     #: Name of the argument that selects what a command acts on, "" if there is none.
     selected: str = ""
 
@@ -57,7 +60,7 @@ class Caller:
     def ask(self) -> list[str]:
         """The signature of the method by which a host sends a request, for what is selected."""
         more = f", {self.selected}: int | None = None" if self.selected else ""
-        arguments = f"self, request: Request, response: type[_R]{more}"
+        arguments = f"self, request: {self.request}, response: type[_R]{more}"
         line = f"{self.prefix}def ask({arguments}) -> _R:"
         return (
             [line] if len(line) + 4 <= WIDTH else [f"{self.prefix}def ask(", f"    {arguments}", ") -> _R:"]
@@ -192,8 +195,10 @@ class BusModule:
         self._sides = sides_of(plan.protocol, transactions)
         self._place: Place = place_of(plan)
         self._classes = {"Message"}
-        if plan.protocol.bus.kind == "host" and plan.role != "slave":
-            self._classes.add("Request")
+        packets = isinstance(plan.frames["request"].receiver, InStep)
+        #: The class of requests, which have a frame of their own.
+        self._request = "Request" if packets and plan.protocol.bus.kind == "host" else "Message"
+        self._classes |= {self._request} if plan.role != "slave" else set()
 
     @cached_property
     def ports(self) -> Ports:
@@ -518,7 +523,8 @@ class BusModule:
             )
             for each in calls
         ]
-        return make_caller(name, doc, methods, asynchronous=asynchronous, one=one, selected=argument)
+        made = make_caller(name, doc, methods, asynchronous=asynchronous, one=one)
+        return replace(made, request=self._request, selected=argument)
 
     @property
     def _numbers(self) -> str:
@@ -675,9 +681,7 @@ def caller_doc(
     return python_text.docstring([*doc, *textwrap.wrap(supplied, WIDTH - 8), *more])
 
 
-def make_caller(
-    name: str, doc: list[str], methods: list[Method], *, asynchronous: bool, one: bool, selected: str = ""
-) -> Caller:
+def make_caller(name: str, doc: list[str], methods: list[Method], *, asynchronous: bool, one: bool) -> Caller:
     """A class of calls, blocking or for asyncio."""
     prefix = "async " if asynchronous else ""
-    return Caller(f"Async{name}" if asynchronous else name, doc, prefix, one, methods, selected)
+    return Caller(f"Async{name}" if asynchronous else name, doc, prefix, one, methods)

@@ -12,6 +12,7 @@ from tests.support.whole import frames, kinds, text_ids, words
 from tests.support.whole.decided import decide
 from tests.support.whole.fields import FieldMaker, Room
 from tests.support.whole.frames import Shape
+from tests.support.whole.hosts import come_back
 from tests.support.whole.kinds import Kinds
 from tests.support.whole.reference.notation import whole_span
 from tests.support.whole.settled import settle
@@ -115,6 +116,7 @@ class _Maker:
             _link(rng, document)
         _stop_answers(random.Random(f"streams {self.seed}"), document)
         _begin_with_break(random.Random(f"break {self.seed}"), document)
+        come_back(random.Random(f"resync {self.seed}"), document)
         if not several:
             text_ids.draw(random.Random(f"text ids {self.seed}"), document)
         if several:
