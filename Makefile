@@ -74,7 +74,7 @@ bench: .venv/.user  ## Measure the generated code beside its peers
 soak: .venv/.user  ## A million transactions on a bad line, 50 000 over a pty, 20 000 with each firmware, 500 000 of other protocols, and the behaviours of every bus over a pty; writes docs/soak.md (45 minutes)
 	@$(BIN)/python -m tests.soak.bus --output docs/soak.md
 	@$(BIN)/python -m tests.soak.firmware --output docs/soak.md
-	@$(BIN)/python -m tests.soak.buses
+	@$(BIN)/python -m tests.soak.buses --output docs/soak.md
 	@QLINKGEN_PTYS=all $(BIN)/python -m pytest tests/bus -k behaviour -m pty
 
 soak-schemas: .venv/.dev  ## 1 000 random whole schemas through every target, gcc and clang; writes docs/soak-schemas.md (40 minutes)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 from benchmarks.report import as_markdown
 from tests.soak.firmware_run import COMPARED, PHASE, Result
+from tests.soak.sections import put_section
 
 TITLE = "## Firmware on emulated chips"
-_SECTION = re.compile(rf"\n*{re.escape(TITLE)}\n.*?(?=\n\n## |\Z)", re.DOTALL)
 _BORN = {
     "posix": "a process",
     "lm3s6965evb": "QEMU, Cortex-M3",
@@ -48,20 +47,16 @@ def _n(number: int) -> str:
 
 def put_into(page: str, results: Sequence[Result]) -> str:
     """Return a page with this section, in place of the old one or at the end."""
-    section = "\n\n" + as_section(results).rstrip("\n")
-    if _SECTION.search(page):
-        return _SECTION.sub(lambda _: section, page).rstrip("\n") + "\n"
-    return page.rstrip("\n") + section + "\n"
+    return put_section(page, TITLE, as_section(results))
 
 
 def as_section(results: Sequence[Result]) -> str:
-    """Return the section."""
+    """Return the section without its heading."""
     rows = [
         [cells[0][0], *(cell[1] for cell in cells)]
         for cells in zip(*(_figures(result) for result in results), strict=True)
     ]
     return _PAGE.format(
-        title=TITLE,
         count=results[0].wanted,
         seed=results[0].seed,
         phase=PHASE,
@@ -71,8 +66,6 @@ def as_section(results: Sequence[Result]) -> str:
 
 
 _PAGE = """\
-{title}
-
 The slave of examples/firmware on each of its ports, over the serial line of its process or emulator. Each
 receives a random mix of all commands, with many bytes of A5 and 00, repeated and wrong counters, full FIFOs,
 and correct and broken programs; between them damaged requests, frames for other nodes, and noise. A virtual
