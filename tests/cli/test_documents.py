@@ -179,12 +179,29 @@ def test_excerpts(document: str, qlinkgen: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "document", sorted({*DOCUMENTS, "CONTRIBUTING.md", "docs/README.md", "docs/receiver.md"})
+    "document",
+    sorted({*DOCUMENTS, "CONTRIBUTING.md", "docs/README.md", "docs/pump-bus.md", "docs/receiver.md"}),
 )
 def test_links(document: str) -> None:
     path = REPOSITORY / document
     for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", path.read_text("utf-8")):
         assert (path.parent / target).exists(), target
+
+
+def test_the_tutorial_has_every_frame_of_its_document() -> None:
+    document = (REPOSITORY / "docs/pump-bus.md").read_text("utf-8")
+    frames = re.findall(r"unit +(55 AA(?: [0-9A-F]{2})+)$", document, re.MULTILINE)
+    (schema,) = [block.text for block in blocks("docs/tutorial.md") if block.name == "pump.yaml"]
+    assert len(frames) == 4
+    assert frames == re.findall(r"wire: ([0-9A-F ]+),", schema)
+
+
+def test_every_file_of_the_tutorial_is_named_before_it() -> None:
+    """The marks are comments, which a reader does not see."""
+    text = (REPOSITORY / "docs/tutorial.md").read_text("utf-8")
+    for block in blocks("docs/tutorial.md"):
+        if block.mark == "file":
+            assert f"Save this as `{block.name}`:\n\n<!-- file: {block.name} -->" in text
 
 
 def test_the_c_of_the_readme(require_tool: Callable[..., str], qlinkgen: Run, tmp_path: Path) -> None:
