@@ -11,7 +11,7 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from itertools import chain, islice
+from itertools import chain, islice, product
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -127,9 +127,17 @@ class Capture:
             if not formats:
                 what = f"only a silence ends a frame of {self._protocol.name}, and raw bytes have no times"
                 raise Failure(f"{what}; give hex text with one frame on each line")
-        bus = self._protocol.bus
-        frame = Frame(options.baud or bus.baud, bus.bits_per_byte)
-        return [_Reader(reader_of(each, frame), each == "raw") for each in formats]
+        readers: list[_Reader] = []
+        for each in formats:
+            readers += self._of_samples() if each == "samples" else [_Reader(reader_of(each), each == "raw")]
+        return readers
+
+    def _of_samples(self) -> list[_Reader]:
+        """Return readers of levels: as the schema states the line, and as it may be instead."""
+        bus, given = self._protocol.bus, self._options.baud
+        speeds = dict.fromkeys([given] if given else [bus.baud, None])
+        bits = dict.fromkeys([bus.bits_per_byte, 10, 11])
+        return [_Reader(reader_of("samples", Frame(*each))) for each in product(speeds, bits)]
 
 
 def _choose(

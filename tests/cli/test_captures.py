@@ -17,6 +17,7 @@ import zstandard
 
 from qlinkgen.captures.pcapng import Direction as Way
 from qlinkgen.codecs import qlink
+from qlinkgen.model.checksum import catalogue
 from tests.captures.written import EVERY, NANO, SILENT, START, STATED, Burst
 from tests.cli.conftest import THERMO, Run
 
@@ -136,6 +137,19 @@ def test_an_own_schema_and_a_ring(qlinkgen: Run, tmp_path: Path) -> None:
         file.write_bytes(EVERY[name][1]([Burst(keys, START, "sent"), Burst(keys, START + 10**7, "received")]))
         found = records(qlinkgen("decode", "trio", file).out)
         assert [each["message"] for each in found] == ["keypad_mode"] * 2, name
+
+
+def test_levels_of_a_line_that_is_not_as_the_schema_states(qlinkgen: Run, tmp_path: Path) -> None:
+    """Without the parity bit of the schema, and at another speed, if it is not given."""
+    file = tmp_path / "capture"
+    frames = [bytes.fromhex(f"01030{index}6b000376"[:12]) for index in range(6)]
+    crc = next(each for each in catalogue() if each.name == "crc-16/modbus")
+    whole = [each + crc.compute(each).to_bytes(2, "little") for each in frames]
+    bursts = [Burst(each, START + 10**8 * index, "sent") for index, each in enumerate(whole)]
+    file.write_bytes(EVERY["samples"][1](bursts))
+    done = qlinkgen("decode", "modbus_rtu", file)
+    assert [each["message"] for each in records(done.out)] == ["read_holding_registers.request"] * 6
+    assert qlinkgen("decode", "modbus_rtu", "--capture-baud", "9600", file).code == 1
 
 
 def test_packets_of_a_host(qlinkgen: Run, tmp_path: Path) -> None:
