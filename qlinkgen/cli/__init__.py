@@ -24,6 +24,7 @@ COMMANDS = {
     "explain": "Describe every byte of a frame, and its errors.",
     "stats": "Print statistics of captures: use of the line, response times, missing answers, faults.",
     "export": "Write the frames of captures as tables.",
+    "coverage": "Print which messages and values captures have exercised.",
     "crc": "List check values, or find those that fit frames.",
     "budget": "Compute the duration of a cycle of requests, and its share of the line.",
     "simulate": "Simulate nodes, a ring or a chip set on a new port, with optional faults.",

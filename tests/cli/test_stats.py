@@ -182,3 +182,56 @@ def test_a_monitor_of_a_capture(qlinkgen: Run, capture: Path, tmp_path: Path) ->
     empty = tmp_path / "empty"
     empty.write_bytes(b"")
     assert qlinkgen("monitor", "qlink", "--capture", empty).code == 1
+
+
+def test_what_a_capture_covers(qlinkgen: Run, capture: Path, tmp_path: Path) -> None:
+    done = qlinkgen("coverage", "qlink", capture)
+    assert done.code == 0
+    assert done.lines[0].startswith("2 of ")
+    assert re.search(r"^ +counter +101 +0\.\.99 +0\.\.255$", done.out, re.MULTILINE)
+    assert re.search(r"^ +motor_status +99 +0 values +2 +running, position_valid$", done.out, re.MULTILINE)
+    assert re.search(r"^node_start\.request +0 +the message$", done.out, re.MULTILINE)
+    found = json.loads(qlinkgen("coverage", "qlink", capture, "--format", "json").out)
+    assert found["messages"]["motion.request"] == 101
+    (position,) = (each for each in found["values"] if each["field"] == "position" and each["count"])
+    assert (position["least"], position["most"]) == (0, 99)
+    gaps = qlinkgen("coverage", "qlink", capture, "--missing")
+    assert gaps.code == 1
+    assert "counter" not in gaps.out
+    assert qlinkgen("coverage", "qlink", capture, "--node", "9").code == 1
+
+
+def test_coverage_without_gaps(qlinkgen: Run, tmp_path: Path) -> None:
+    """Names of enums, flags, booleans and bits, in arrays and records."""
+    schema, file = tmp_path / "own.yaml", tmp_path / "hex"
+    schema.write_text(
+        """\
+qlinkgen: 1
+protocol: {name: own, revision: "1", source: Made up}
+enums: {mode: {type: u8, values: {off: 0, on: 1}}}
+flags: {state: {type: u8, values: {hot: 0, wet: 1}}}
+frame:
+  parts:
+    start: {role: constant, value: 7E}
+    size: {role: length, type: u8, counts: [data]}
+    number: {role: message, type: u8}
+    data: {role: payload, size: 0..32}
+bus: {kind: ring}
+messages:
+  told:
+    id: 1
+    fields: {mode: mode, modes: "mode[2]", state: state, sure: bool}
+"""
+    )
+    wires = [
+        qlinkgen("encode", schema, "told", "mode=on", "modes=off,on", "state=1", "sure=true"),
+        qlinkgen("encode", schema, "told", "mode=off", "modes=off,off", "state=2", "sure=false"),
+    ]
+    file.write_text(wires[0].out)
+    first = qlinkgen("coverage", schema, file, "--missing")
+    assert first.code == 1, wires[0].err + first.err
+    assert re.findall(r"^ *(\w+) +1 .* (\w+)$", first.out, re.MULTILINE) == [
+        ("mode", "off"), ("state", "wet"), ("sure", "false")
+    ]  # fmt: skip
+    file.write_text("".join(each.out for each in wires))
+    assert qlinkgen("coverage", schema, file, "--missing").code == 0
