@@ -13,6 +13,11 @@ from qlinkgen.transport.port import Ability, Capabilities, Port, closed_here
 class VirtualPort(Port):
     """The outside's port on a `Wire`. Time advances only in `read` and `sleep`, independently of real time.
 
+    Collisions are those of the line: if it has a speed, and is not made with ``collisions=False``, bytes of
+    transmissions that overlap are changed at random for every receiver, this port and the stations alike, and
+    `wire.collisions` counts the transmissions that began during another one. On a line without a speed bytes
+    take no time, so nothing overlaps. With an echo, `write` during another transmission gives a garbled echo.
+
     Attributes:
         wire: the line.
     """
