@@ -41,6 +41,7 @@ DOCUMENTS = [
     "docs/own-io.md",
     "docs/platforms.md",
     "docs/dialogues.md",
+    "docs/instruments.md",
     "docs/timing.md",
     "docs/mc1231a.md",
     "docs/trio.md",
@@ -180,7 +181,16 @@ def test_excerpts(document: str, qlinkgen: Run, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "document",
-    sorted({*DOCUMENTS, "CONTRIBUTING.md", "docs/README.md", "docs/pump-bus.md", "docs/receiver.md"}),
+    sorted(
+        {
+            *DOCUMENTS,
+            "CONTRIBUTING.md",
+            "docs/README.md",
+            "docs/explain/separators.md",
+            "docs/pump-bus.md",
+            "docs/receiver.md",
+        }
+    ),
 )
 def test_links(document: str) -> None:
     path = REPOSITORY / document
