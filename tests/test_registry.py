@@ -19,7 +19,6 @@ NAMES = ("qlink", "trio", "mc1231a")
 SOURCES = Path(qlinkgen.__file__).parent
 #: Command-line parts of what is written by hand for one protocol.
 OWN = {
-    "cli/load.py",
     "cli/keypad_screens.py", "cli/ring_console.py", "cli/ring_place.py", "cli/ring_programs.py",
     "cli/simulate_host.py", "cli/simulate_ring.py", "cli/send_ring.py",
     "sim/chip_bus.py", "sim/key_script.py", "sim/port_ring.py", "sim/virtual_ring.py",

@@ -179,11 +179,3 @@ def parse_nodes(text: str, first: int, last: int, where: str = "--nodes") -> lis
             raise Failure(f"{where} {text}: duplicate node {min(double)}; list each once")
         nodes += range(begin, end + 1)
     return sorted(nodes)
-
-
-def qlink_node(context: click.Context, parameter: click.Parameter, text: str) -> int:  # noqa: ARG001
-    """Parse the node number of ``--node`` on Q.link; a callback of click."""
-    node = whole_number(text)
-    if node is None or not 1 <= node <= 16:
-        raise Failure(f"--node {text}: not a node; nodes are 1..16")
-    return node

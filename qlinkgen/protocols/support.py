@@ -41,12 +41,10 @@ class Support:
     Attributes:
         name: the protocol.
         simulated: its nodes are written by hand, so that a ring of them can be simulated.
-        loads: its package has a procedure that loads a program.
     """
 
     name: str
     simulated: bool = False
-    loads: bool = False
 
     def accepts(self) -> Mapping[str, Accepts] | None:
         """Return further rules for matching responses to requests, by command."""

@@ -5,13 +5,18 @@ from __future__ import annotations
 import re
 import signal
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import pytest
 
+from qlinkgen.cli.codec import load_codec
 from qlinkgen.codecs import qlink
+from qlinkgen.link.slave import SlaveEngine
+from qlinkgen.protocols.hexfile import read_hex
 from qlinkgen.protocols.qlink import VirtualNode
-from qlinkgen.protocols.qlink.hexfile import read_hex
-from qlinkgen.sim import FaultPlan
+from qlinkgen.schema import load
+from qlinkgen.sim import FaultPlan, Wire
 from tests.cli.conftest import OnLine, Run
 from tests.cli.wire import CALM, PATIENCE, bus, call, end, line, on_terminal, started, wait_for
 
@@ -165,7 +170,7 @@ def test_a_wrong_file_is_found_before_the_port_is_opened(
     [
         (("--node", "17"), 2, "--node 17: not a node; nodes are 1..16"),
         (("--node", "x"), 2, "--node x: not a node"),
-        ((), 2, "Missing option '--node'"),
+        ((), 2, "the program is for one node of qlink; add --node N, 1..16"),
         (("--node", "3", "--patience", "-1"), 2, "--patience -1: not a number of seconds"),
         (("--node", "3"), 1, "port '/dev/not-there' does not exist"),
     ],
@@ -180,3 +185,120 @@ def test_a_file_that_is_not_there(qlinkgen: Run, tmp_path: Path) -> None:
     result = qlinkgen("load", "qlink", "/dev/not-there", tmp_path / "nothing.hex", "--node", "3")
     assert result.code == 2
     assert "nothing.hex: No such file or directory" in result.err
+
+
+#: A link whose device takes an image in pieces of two bytes.
+FLASH = """
+qlinkgen: 1
+protocol: {name: flasher, revision: "1", source: None}
+frame:
+  parts:
+    start: {value: 02}
+    length: {type: u8, counts: [command, data]}
+    command: {role: message, type: u8}
+    data: {role: payload, size: 0..8}
+    check: {type: u8, algorithm: sum8, over: [length, command, data]}
+bus: {kind: master_slave, baud: 9600}
+commands:
+  write_flash:
+    id: 1
+    request: {number: u8, image: "bytes[0..2]"}
+    response: {number: {type: u8, echo: true}}
+    repeat: {counter: number}
+"""
+
+#: A second command that could carry pieces, before the first one.
+OTHER = """
+  other: {id: 2, request: {number: u8, part: "bytes[0..2]"}, response: {}, repeat: {counter: number}}
+  write_flash:
+"""
+
+
+class Flash:
+    """Keeps the requests, each once although it may be repeated."""
+
+    number = 0
+
+    def __init__(self, codec: ModuleType) -> None:
+        self.codec = codec
+        self.stored: list[tuple[int, bytes]] = []
+
+    def handle(self, request: Any, now: float) -> Any:
+        piece = (request.number, bytes(request.image))
+        if [piece] != self.stored[-1:]:
+            self.stored.append(piece)
+        return self.codec.WriteFlashResponse(number=request.number)
+
+
+def test_an_image_into_a_device_of_any_schema(qlinkgen: Run, on_line: OnLine, tmp_path: Path) -> None:
+    schema, image = tmp_path / "flasher.yaml", tmp_path / "image.bin"
+    schema.write_text(FLASH)
+    image.write_bytes(bytes(range(256)) * 2 + b"\x07")
+    codec = load_codec(load(schema))
+    device = Flash(codec)
+    wire = Wire(baud=None, faults=FaultPlan(drop=0.05, seed=3))
+    wire.attach(SlaveEngine(codec, device), "device")
+    result = qlinkgen(
+        "load", str(schema), on_line(wire), image, "--raw", "--patience", "60", "--slack", "0.05"
+    )
+    assert result.code == 0
+    assert re.fullmatch(r"device: 513 bytes in 257 pieces, [1-9]\d* repeats?, \d+\.\d\d s\n", result.out)
+    assert [number for number, _ in device.stored] == [*range(256), 0], "no empty request: none may be empty"
+    assert b"".join(data for _, data in device.stored) == image.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        (
+            "repeat: {counter: number}",
+            "repeat: safe",
+            "a repeated piece twice; write repeat: {counter: FIELD}",
+        ),
+        (
+            'image: "bytes[0..2]"',
+            "image: u8",
+            "no command whose request carries a piece of a program; give one",
+        ),
+        ('"bytes[0..2]"', '"bytes[2..2]"', "image has at least 2 bytes, and the last piece"),
+        ("number: u8,", "number: {type: u8, range: 1..9},", "number does not count 0, 1, 2..; write a type"),
+        ("number: u8,", "number: u8, zone: {type: u8, range: 1..9},", "zone has no default"),
+        (
+            "  write_flash:\n",
+            OTHER,
+            "several commands that take a program in pieces; choose of other, write_flash",
+        ),
+    ],
+)
+def test_what_a_schema_lacks_is_named(qlinkgen: Run, tmp_path: Path, old: str, new: str, text: str) -> None:
+    assert old in FLASH
+    schema = tmp_path / "flasher.yaml"
+    schema.write_text(FLASH.replace(old, new, 1))
+    result = qlinkgen("load", str(schema), "/dev/not-there", tmp_path / "image.bin", "--raw")
+    assert (result.code, result.out) == (2, "")
+    assert text in result.err
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (
+            ("trio", "x"),
+            "trio is of bus kind ring, and pieces of a program are acknowledged by the node of a",
+        ),
+        (("mc1231a", "x"), "mc1231a is of bus kind host"),
+        (("qlink", "x"), "the program is for one node of qlink; add --node N, 1..16"),
+        (
+            ("qlink", "x", "--command", "motion"),
+            "motion.request has no field of bytes, and a piece of a program",
+        ),
+        (("qlink", "x", "--command", "write"), "write does not say which field numbers its requests"),
+        (("qlink", "x", "--command", "node_program_laod"), "did you mean node_program_load?"),
+        (("modbus_rtu", "x"), "; give one a field of bytes"),
+    ],
+)
+def test_what_cannot_be_loaded(qlinkgen: Run, words: tuple[str, ...], text: str) -> None:
+    name, *rest = words
+    result = qlinkgen("load", name, "/dev/not-there", *rest)
+    assert (result.code, result.out) == (2, "")
+    assert text in result.err

@@ -12,9 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qlinkgen.errors import ExtraMissing, HexFileError, QlinkgenError
-from qlinkgen.protocols.qlink import hexfile
-from qlinkgen.protocols.qlink.hex_image import HexImage, HexReader
-from qlinkgen.protocols.qlink.hexfile import pieces, read_hex
+from qlinkgen.protocols import hexfile
+from qlinkgen.protocols.hex_image import HexImage, HexReader
+from qlinkgen.protocols.hexfile import read_hex
+from qlinkgen.protocols.qlink.loading import pieces
 
 END = ":00000001FF"
 

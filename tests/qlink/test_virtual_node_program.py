@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qlinkgen.codecs import qlink
-from qlinkgen.protocols.qlink.hex_image import BrokenRecord, HexImage, HexReader, segments_of
-from qlinkgen.protocols.qlink.hexfile import pieces
+from qlinkgen.protocols.hex_image import BrokenRecord, HexImage, HexReader, segments_of
+from qlinkgen.protocols.qlink.loading import pieces
 from qlinkgen.protocols.qlink.virtual_node import VirtualNode
 
 END = b":00000001FF\r\n"

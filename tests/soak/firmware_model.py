@@ -9,8 +9,8 @@ from typing import Any
 
 from qlinkgen.codecs import qlink
 from qlinkgen.link import SlaveEngine
+from qlinkgen.protocols.hex_image import BrokenRecord, HexReader
 from qlinkgen.protocols.qlink import VirtualNode
-from qlinkgen.protocols.qlink.hex_image import BrokenRecord, HexReader
 from qlinkgen.protocols.qlink.program_store import ProgramStore
 from tests.firmware.diagnostics import Counters, Diagnostics, ProgramState
 

@@ -16,10 +16,10 @@ from qlinkgen.errors import CommandError
 from qlinkgen.link.codec import Message
 from qlinkgen.link.procedure import Procedure
 from qlinkgen.link.transaction import Question
+from qlinkgen.protocols.hexfile import read_hex
 from qlinkgen.protocols.qlink import loading, motion, pacing
 from qlinkgen.protocols.qlink.arguments import known, positive, whole
 from qlinkgen.protocols.qlink.facts import BROADCAST, SYNCS
-from qlinkgen.protocols.qlink.hexfile import read_hex
 
 #: Requests after which a motor may have stopped, so that its last status is outdated.
 _STOPPING = (qlink.NodeStopRequest, qlink.ClearFifoRequest, qlink.NodeResetRequest)

@@ -7,9 +7,9 @@ from math import isfinite
 
 from qlinkgen.codecs import qlink
 from qlinkgen.codecs.qlink import PositionType
+from qlinkgen.protocols.hex_image import HexImage
 from qlinkgen.protocols.qlink.arguments import known, positive, whole
 from qlinkgen.protocols.qlink.facts import INFO, LINES, LONGEST_DELAY, NODES, POSITION_TYPES
-from qlinkgen.protocols.qlink.hex_image import HexImage
 from qlinkgen.protocols.qlink.io_image import IoImage
 from qlinkgen.protocols.qlink.motor import MotorRequests, echo
 from qlinkgen.protocols.qlink.path_fifo import PathFifo, signed_word

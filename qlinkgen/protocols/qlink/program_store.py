@@ -15,8 +15,8 @@ Assumptions where the document is silent:
 
 from __future__ import annotations
 
+from qlinkgen.protocols.hex_image import BrokenRecord, HexImage, HexReader
 from qlinkgen.protocols.qlink.facts import PIECES
-from qlinkgen.protocols.qlink.hex_image import BrokenRecord, HexImage, HexReader
 from qlinkgen.protocols.qlink.statistics import NodeStatistics
 
 

@@ -34,4 +34,4 @@ class QlinkSupport(Support):
         return [VirtualNode(number, position_type=kind, serial_number=1000 + number) for number in numbers]
 
 
-SUPPORT: Final = QlinkSupport("qlink", loads=True)
+SUPPORT: Final = QlinkSupport("qlink")

@@ -17,7 +17,6 @@ a loader may wait for either.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from importlib import import_module
 from io import StringIO
 from pathlib import Path
@@ -25,11 +24,9 @@ from types import ModuleType
 from typing import Protocol
 
 from qlinkgen.errors import ExtraMissing, HexFileError
-from qlinkgen.protocols.qlink.arguments import whole
-from qlinkgen.protocols.qlink.facts import PIECE
-from qlinkgen.protocols.qlink.hex_image import SIZES, HexImage
+from qlinkgen.protocols.hex_image import SIZES, HexImage
 
-__all__ = ["LINE_ENDS", "MOST_TEXT", "PIECE", "pieces", "read_hex"]
+__all__ = ["LINE_ENDS", "MOST_TEXT", "read_hex"]
 
 #: Most bytes of text: some 6 MB of program, hours on the bus. A larger file is not a program.
 MOST_TEXT = 16 * 1024 * 1024
@@ -47,7 +44,7 @@ def read_hex(path: str | os.PathLike[str], *, line_end: bytes = b"\r\n") -> HexI
         line_end: line end of every record on the wire: CR LF, LF or CR.
 
     Returns:
-        The program; its `text` is sent by node_program_load.
+        The program; its `text` is what a node receives.
 
     Raises:
         HexFileError: the file is invalid; the message begins with file and line.
@@ -67,20 +64,6 @@ def read_hex(path: str | os.PathLike[str], *, line_end: bytes = b"\r\n") -> HexI
         raise HexFileError("no data record, so nothing to load; check how the file was made", file=name)
     text = b"".join(line.encode("ascii") + line_end for line in lines if line)
     return HexImage(text, segments, _entry(program.start_addr))
-
-
-def pieces(text: bytes, size: int = PIECE) -> Iterator[bytes]:
-    """Cut a text into the program data of its requests, all of the same size except the last.
-
-    Args:
-        text: as in `HexImage.text`.
-        size: bytes of each, 1..25.
-
-    Raises:
-        ValueError: `size` is out of range.
-    """
-    whole("size", size, 1, PIECE)
-    return (text[at : at + size] for at in range(0, len(text), size))
 
 
 class _Program(Protocol):
