@@ -10,8 +10,11 @@
  * C99, C11 and C++17; no library except the headers included below, no allocation, no static data except a CRC
  * table if selected. Functions that write return the number of bytes, or a negative mc1231a_status_t. Optional
  * macros, to be defined before the include:
- *   MC1231A_ENABLE_FLOAT=1  conversions between raw and physical values, in double
- *   MC1231A_ENABLE_NAMES=1  names of enum values as text
+ *   MC1231A_ENABLE_FLOAT=1    conversions between raw and physical values
+ *   MC1231A_REAL=float        those conversions in float, not in double
+ *   MC1231A_ENABLE_NAMES=1    names of enum values as text
+ *   MC1231A_CONST_HANDLERS=1  the functions of a slave in a const struct, for flash
+ *   MC1231A_WITHOUT_MESSAGE   a slave without the command of this name
  *
  * Example:
  *
@@ -55,6 +58,9 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#if defined(__AVR__)
+#include <avr/pgmspace.h>
+#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -66,6 +72,11 @@ extern "C" {
 #ifndef MC1231A_ENABLE_NAMES
 #define MC1231A_ENABLE_NAMES 0
 #endif
+
+/* The schema and the generator of this header. */
+#define MC1231A_SCHEMA_REVISION "1"
+#define MC1231A_SCHEMA_HASH 0xB76B0F9EUL
+#define MC1231A_GENERATOR_VERSION "0.1.0"
 
 /* Requirements: bytes of eight bits, and two's complement in conversions from unsigned to signed. */
 typedef char mc1231a_needs_bytes_of_8_bits_[(CHAR_BIT == 8) ? 1 : -1];
@@ -221,27 +232,33 @@ static inline uint32_t mc1231a_get_u32_be_(const uint8_t *at)
 }
 
 #if MC1231A_ENABLE_FLOAT
-/* The nearest whole number of steps, ties to even, with the precision of a double. */
-static inline int mc1231a_nearest_uint32_(double steps, uint32_t least, uint32_t most, uint32_t *raw)
+#ifndef MC1231A_REAL
+#define MC1231A_REAL double
+#endif
+typedef MC1231A_REAL mc1231a_real_t;
+
+/* The nearest whole number of steps, ties to even, with the precision of the type. */
+static inline int mc1231a_nearest_uint32_(mc1231a_real_t steps, uint32_t least, uint32_t most, uint32_t *raw)
 {
     uint32_t whole;
-    double rest;
-    if (!((steps >= ((double)least - 0.5)) && (steps <= ((double)most + 0.5)))) {
+    mc1231a_real_t rest;
+    if (!((steps >= ((mc1231a_real_t)least - (mc1231a_real_t)0.5)) &&
+        (steps <= ((mc1231a_real_t)most + (mc1231a_real_t)0.5)))) {
         return MC1231A_ERROR_RANGE;
     }
-    if (steps <= (double)least) {
+    if (steps <= (mc1231a_real_t)least) {
         *raw = least;
         return MC1231A_OK;
     }
-    if (steps >= (double)most) {
+    if (steps >= (mc1231a_real_t)most) {
         *raw = most;
         return MC1231A_OK;
     }
     whole = (uint32_t)steps;
-    rest = steps - (double)whole;
-    if ((rest > 0.5) || ((rest == 0.5) && ((whole & 1U) != 0U))) {
+    rest = steps - (mc1231a_real_t)whole;
+    if ((rest > (mc1231a_real_t)0.5) || ((rest == (mc1231a_real_t)0.5) && ((whole & 1U) != 0U))) {
         ++whole;
-    } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1U) != 0U))) {
+    } else if ((rest < (mc1231a_real_t)-0.5) || ((rest == (mc1231a_real_t)-0.5) && ((whole & 1U) != 0U))) {
         --whole;
     } else {
         /* already rounded */
@@ -249,26 +266,27 @@ static inline int mc1231a_nearest_uint32_(double steps, uint32_t least, uint32_t
     *raw = whole;
     return MC1231A_OK;
 }
-static inline int mc1231a_nearest_int32_(double steps, int32_t least, int32_t most, int32_t *raw)
+static inline int mc1231a_nearest_int32_(mc1231a_real_t steps, int32_t least, int32_t most, int32_t *raw)
 {
     int32_t whole;
-    double rest;
-    if (!((steps >= ((double)least - 0.5)) && (steps <= ((double)most + 0.5)))) {
+    mc1231a_real_t rest;
+    if (!((steps >= ((mc1231a_real_t)least - (mc1231a_real_t)0.5)) &&
+        (steps <= ((mc1231a_real_t)most + (mc1231a_real_t)0.5)))) {
         return MC1231A_ERROR_RANGE;
     }
-    if (steps <= (double)least) {
+    if (steps <= (mc1231a_real_t)least) {
         *raw = least;
         return MC1231A_OK;
     }
-    if (steps >= (double)most) {
+    if (steps >= (mc1231a_real_t)most) {
         *raw = most;
         return MC1231A_OK;
     }
     whole = (int32_t)steps;
-    rest = steps - (double)whole;
-    if ((rest > 0.5) || ((rest == 0.5) && ((whole & 1) != 0))) {
+    rest = steps - (mc1231a_real_t)whole;
+    if ((rest > (mc1231a_real_t)0.5) || ((rest == (mc1231a_real_t)0.5) && ((whole & 1) != 0))) {
         ++whole;
-    } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1) != 0))) {
+    } else if ((rest < (mc1231a_real_t)-0.5) || ((rest == (mc1231a_real_t)-0.5) && ((whole & 1) != 0))) {
         --whole;
     } else {
         /* already rounded */
@@ -276,26 +294,27 @@ static inline int mc1231a_nearest_int32_(double steps, int32_t least, int32_t mo
     *raw = whole;
     return MC1231A_OK;
 }
-static inline int mc1231a_nearest_uint16_(double steps, uint16_t least, uint16_t most, uint16_t *raw)
+static inline int mc1231a_nearest_uint16_(mc1231a_real_t steps, uint16_t least, uint16_t most, uint16_t *raw)
 {
     uint16_t whole;
-    double rest;
-    if (!((steps >= ((double)least - 0.5)) && (steps <= ((double)most + 0.5)))) {
+    mc1231a_real_t rest;
+    if (!((steps >= ((mc1231a_real_t)least - (mc1231a_real_t)0.5)) &&
+        (steps <= ((mc1231a_real_t)most + (mc1231a_real_t)0.5)))) {
         return MC1231A_ERROR_RANGE;
     }
-    if (steps <= (double)least) {
+    if (steps <= (mc1231a_real_t)least) {
         *raw = least;
         return MC1231A_OK;
     }
-    if (steps >= (double)most) {
+    if (steps >= (mc1231a_real_t)most) {
         *raw = most;
         return MC1231A_OK;
     }
     whole = (uint16_t)steps;
-    rest = steps - (double)whole;
-    if ((rest > 0.5) || ((rest == 0.5) && ((whole & 1U) != 0U))) {
+    rest = steps - (mc1231a_real_t)whole;
+    if ((rest > (mc1231a_real_t)0.5) || ((rest == (mc1231a_real_t)0.5) && ((whole & 1U) != 0U))) {
         ++whole;
-    } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1U) != 0U))) {
+    } else if ((rest < (mc1231a_real_t)-0.5) || ((rest == (mc1231a_real_t)-0.5) && ((whole & 1U) != 0U))) {
         --whole;
     } else {
         /* already rounded */
@@ -314,16 +333,18 @@ typedef uint32_t mc1231a_velocity_t;
 #define MC1231A_VELOCITY_BIAS 0
 #define MC1231A_VELOCITY_DIVISOR 65536L
 #if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_velocity_physical(mc1231a_velocity_t raw)
+static inline mc1231a_real_t mc1231a_velocity_physical(mc1231a_velocity_t raw)
 {
-    const double scaled = ((double)raw * (double)MC1231A_VELOCITY_FACTOR) + (double)MC1231A_VELOCITY_BIAS;
-    return scaled / (double)MC1231A_VELOCITY_DIVISOR;
+    const mc1231a_real_t scaled = ((mc1231a_real_t)raw * (mc1231a_real_t)MC1231A_VELOCITY_FACTOR) +
+        (mc1231a_real_t)MC1231A_VELOCITY_BIAS;
+    return scaled / (mc1231a_real_t)MC1231A_VELOCITY_DIVISOR;
 }
 
-static inline int mc1231a_velocity_raw(double physical, mc1231a_velocity_t *raw)
+static inline int mc1231a_velocity_raw(mc1231a_real_t physical, mc1231a_velocity_t *raw)
 {
-    const double scaled = (physical * (double)MC1231A_VELOCITY_DIVISOR) - (double)MC1231A_VELOCITY_BIAS;
-    const double steps = scaled / (double)MC1231A_VELOCITY_FACTOR;
+    const mc1231a_real_t scaled = (physical * (mc1231a_real_t)MC1231A_VELOCITY_DIVISOR) -
+        (mc1231a_real_t)MC1231A_VELOCITY_BIAS;
+    const mc1231a_real_t steps = scaled / (mc1231a_real_t)MC1231A_VELOCITY_FACTOR;
     return mc1231a_nearest_uint32_(steps, 0UL, 4294967295UL, raw);
 }
 #endif
@@ -334,18 +355,18 @@ typedef int32_t mc1231a_acceleration_limit_t;
 #define MC1231A_ACCELERATION_LIMIT_BIAS 0
 #define MC1231A_ACCELERATION_LIMIT_DIVISOR 65536L
 #if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_acceleration_limit_physical(mc1231a_acceleration_limit_t raw)
+static inline mc1231a_real_t mc1231a_acceleration_limit_physical(mc1231a_acceleration_limit_t raw)
 {
-    const double scaled = ((double)raw * (double)MC1231A_ACCELERATION_LIMIT_FACTOR) +
-        (double)MC1231A_ACCELERATION_LIMIT_BIAS;
-    return scaled / (double)MC1231A_ACCELERATION_LIMIT_DIVISOR;
+    const mc1231a_real_t scaled = ((mc1231a_real_t)raw * (mc1231a_real_t)MC1231A_ACCELERATION_LIMIT_FACTOR) +
+        (mc1231a_real_t)MC1231A_ACCELERATION_LIMIT_BIAS;
+    return scaled / (mc1231a_real_t)MC1231A_ACCELERATION_LIMIT_DIVISOR;
 }
 
-static inline int mc1231a_acceleration_limit_raw(double physical, mc1231a_acceleration_limit_t *raw)
+static inline int mc1231a_acceleration_limit_raw(mc1231a_real_t physical, mc1231a_acceleration_limit_t *raw)
 {
-    const double scaled = (physical * (double)MC1231A_ACCELERATION_LIMIT_DIVISOR) -
-        (double)MC1231A_ACCELERATION_LIMIT_BIAS;
-    const double steps = scaled / (double)MC1231A_ACCELERATION_LIMIT_FACTOR;
+    const mc1231a_real_t scaled = (physical * (mc1231a_real_t)MC1231A_ACCELERATION_LIMIT_DIVISOR) -
+        (mc1231a_real_t)MC1231A_ACCELERATION_LIMIT_BIAS;
+    const mc1231a_real_t steps = scaled / (mc1231a_real_t)MC1231A_ACCELERATION_LIMIT_FACTOR;
     return mc1231a_nearest_int32_(steps, -1073741824L, 1073741823L, raw);
 }
 #endif
@@ -356,18 +377,18 @@ typedef uint16_t mc1231a_peak_acceleration_t;
 #define MC1231A_PEAK_ACCELERATION_BIAS 0
 #define MC1231A_PEAK_ACCELERATION_DIVISOR 65536L
 #if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_peak_acceleration_physical(mc1231a_peak_acceleration_t raw)
+static inline mc1231a_real_t mc1231a_peak_acceleration_physical(mc1231a_peak_acceleration_t raw)
 {
-    const double scaled = ((double)raw * (double)MC1231A_PEAK_ACCELERATION_FACTOR) +
-        (double)MC1231A_PEAK_ACCELERATION_BIAS;
-    return scaled / (double)MC1231A_PEAK_ACCELERATION_DIVISOR;
+    const mc1231a_real_t scaled = ((mc1231a_real_t)raw * (mc1231a_real_t)MC1231A_PEAK_ACCELERATION_FACTOR) +
+        (mc1231a_real_t)MC1231A_PEAK_ACCELERATION_BIAS;
+    return scaled / (mc1231a_real_t)MC1231A_PEAK_ACCELERATION_DIVISOR;
 }
 
-static inline int mc1231a_peak_acceleration_raw(double physical, mc1231a_peak_acceleration_t *raw)
+static inline int mc1231a_peak_acceleration_raw(mc1231a_real_t physical, mc1231a_peak_acceleration_t *raw)
 {
-    const double scaled = (physical * (double)MC1231A_PEAK_ACCELERATION_DIVISOR) -
-        (double)MC1231A_PEAK_ACCELERATION_BIAS;
-    const double steps = scaled / (double)MC1231A_PEAK_ACCELERATION_FACTOR;
+    const mc1231a_real_t scaled = (physical * (mc1231a_real_t)MC1231A_PEAK_ACCELERATION_DIVISOR) -
+        (mc1231a_real_t)MC1231A_PEAK_ACCELERATION_BIAS;
+    const mc1231a_real_t steps = scaled / (mc1231a_real_t)MC1231A_PEAK_ACCELERATION_FACTOR;
     return mc1231a_nearest_uint16_(steps, 0U, 65535U, raw);
 }
 #endif
@@ -378,16 +399,17 @@ typedef uint32_t mc1231a_jerk_t;
 #define MC1231A_JERK_BIAS 0
 #define MC1231A_JERK_DIVISOR 4294967296LL
 #if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_jerk_physical(mc1231a_jerk_t raw)
+static inline mc1231a_real_t mc1231a_jerk_physical(mc1231a_jerk_t raw)
 {
-    const double scaled = ((double)raw * (double)MC1231A_JERK_FACTOR) + (double)MC1231A_JERK_BIAS;
-    return scaled / (double)MC1231A_JERK_DIVISOR;
+    const mc1231a_real_t scaled = ((mc1231a_real_t)raw * (mc1231a_real_t)MC1231A_JERK_FACTOR) +
+        (mc1231a_real_t)MC1231A_JERK_BIAS;
+    return scaled / (mc1231a_real_t)MC1231A_JERK_DIVISOR;
 }
 
-static inline int mc1231a_jerk_raw(double physical, mc1231a_jerk_t *raw)
+static inline int mc1231a_jerk_raw(mc1231a_real_t physical, mc1231a_jerk_t *raw)
 {
-    const double scaled = (physical * (double)MC1231A_JERK_DIVISOR) - (double)MC1231A_JERK_BIAS;
-    const double steps = scaled / (double)MC1231A_JERK_FACTOR;
+    const mc1231a_real_t scaled = (physical * (mc1231a_real_t)MC1231A_JERK_DIVISOR) - (mc1231a_real_t)MC1231A_JERK_BIAS;
+    const mc1231a_real_t steps = scaled / (mc1231a_real_t)MC1231A_JERK_FACTOR;
     return mc1231a_nearest_uint32_(steps, 0UL, 4294967295UL, raw);
 }
 #endif
@@ -398,16 +420,18 @@ typedef int32_t mc1231a_gear_ratio_t;
 #define MC1231A_GEAR_RATIO_BIAS 0
 #define MC1231A_GEAR_RATIO_DIVISOR 65536L
 #if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_gear_ratio_physical(mc1231a_gear_ratio_t raw)
+static inline mc1231a_real_t mc1231a_gear_ratio_physical(mc1231a_gear_ratio_t raw)
 {
-    const double scaled = ((double)raw * (double)MC1231A_GEAR_RATIO_FACTOR) + (double)MC1231A_GEAR_RATIO_BIAS;
-    return scaled / (double)MC1231A_GEAR_RATIO_DIVISOR;
+    const mc1231a_real_t scaled = ((mc1231a_real_t)raw * (mc1231a_real_t)MC1231A_GEAR_RATIO_FACTOR) +
+        (mc1231a_real_t)MC1231A_GEAR_RATIO_BIAS;
+    return scaled / (mc1231a_real_t)MC1231A_GEAR_RATIO_DIVISOR;
 }
 
-static inline int mc1231a_gear_ratio_raw(double physical, mc1231a_gear_ratio_t *raw)
+static inline int mc1231a_gear_ratio_raw(mc1231a_real_t physical, mc1231a_gear_ratio_t *raw)
 {
-    const double scaled = (physical * (double)MC1231A_GEAR_RATIO_DIVISOR) - (double)MC1231A_GEAR_RATIO_BIAS;
-    const double steps = scaled / (double)MC1231A_GEAR_RATIO_FACTOR;
+    const mc1231a_real_t scaled = (physical * (mc1231a_real_t)MC1231A_GEAR_RATIO_DIVISOR) -
+        (mc1231a_real_t)MC1231A_GEAR_RATIO_BIAS;
+    const mc1231a_real_t steps = scaled / (mc1231a_real_t)MC1231A_GEAR_RATIO_FACTOR;
     return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
 }
 #endif
@@ -421,16 +445,18 @@ typedef int32_t mc1231a_acceleration_t;
 #define MC1231A_ACCELERATION_BIAS 0
 #define MC1231A_ACCELERATION_DIVISOR 65536L
 #if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_acceleration_physical(mc1231a_acceleration_t raw)
+static inline mc1231a_real_t mc1231a_acceleration_physical(mc1231a_acceleration_t raw)
 {
-    const double scaled = ((double)raw * (double)MC1231A_ACCELERATION_FACTOR) + (double)MC1231A_ACCELERATION_BIAS;
-    return scaled / (double)MC1231A_ACCELERATION_DIVISOR;
+    const mc1231a_real_t scaled = ((mc1231a_real_t)raw * (mc1231a_real_t)MC1231A_ACCELERATION_FACTOR) +
+        (mc1231a_real_t)MC1231A_ACCELERATION_BIAS;
+    return scaled / (mc1231a_real_t)MC1231A_ACCELERATION_DIVISOR;
 }
 
-static inline int mc1231a_acceleration_raw(double physical, mc1231a_acceleration_t *raw)
+static inline int mc1231a_acceleration_raw(mc1231a_real_t physical, mc1231a_acceleration_t *raw)
 {
-    const double scaled = (physical * (double)MC1231A_ACCELERATION_DIVISOR) - (double)MC1231A_ACCELERATION_BIAS;
-    const double steps = scaled / (double)MC1231A_ACCELERATION_FACTOR;
+    const mc1231a_real_t scaled = (physical * (mc1231a_real_t)MC1231A_ACCELERATION_DIVISOR) -
+        (mc1231a_real_t)MC1231A_ACCELERATION_BIAS;
+    const mc1231a_real_t steps = scaled / (mc1231a_real_t)MC1231A_ACCELERATION_FACTOR;
     return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
 }
 #endif
@@ -441,16 +467,18 @@ typedef int32_t mc1231a_signed_velocity_t;
 #define MC1231A_SIGNED_VELOCITY_BIAS 0
 #define MC1231A_SIGNED_VELOCITY_DIVISOR 65536L
 #if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_signed_velocity_physical(mc1231a_signed_velocity_t raw)
+static inline mc1231a_real_t mc1231a_signed_velocity_physical(mc1231a_signed_velocity_t raw)
 {
-    const double scaled = ((double)raw * (double)MC1231A_SIGNED_VELOCITY_FACTOR) + (double)MC1231A_SIGNED_VELOCITY_BIAS;
-    return scaled / (double)MC1231A_SIGNED_VELOCITY_DIVISOR;
+    const mc1231a_real_t scaled = ((mc1231a_real_t)raw * (mc1231a_real_t)MC1231A_SIGNED_VELOCITY_FACTOR) +
+        (mc1231a_real_t)MC1231A_SIGNED_VELOCITY_BIAS;
+    return scaled / (mc1231a_real_t)MC1231A_SIGNED_VELOCITY_DIVISOR;
 }
 
-static inline int mc1231a_signed_velocity_raw(double physical, mc1231a_signed_velocity_t *raw)
+static inline int mc1231a_signed_velocity_raw(mc1231a_real_t physical, mc1231a_signed_velocity_t *raw)
 {
-    const double scaled = (physical * (double)MC1231A_SIGNED_VELOCITY_DIVISOR) - (double)MC1231A_SIGNED_VELOCITY_BIAS;
-    const double steps = scaled / (double)MC1231A_SIGNED_VELOCITY_FACTOR;
+    const mc1231a_real_t scaled = (physical * (mc1231a_real_t)MC1231A_SIGNED_VELOCITY_DIVISOR) -
+        (mc1231a_real_t)MC1231A_SIGNED_VELOCITY_BIAS;
+    const mc1231a_real_t steps = scaled / (mc1231a_real_t)MC1231A_SIGNED_VELOCITY_FACTOR;
     return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
 }
 #endif
@@ -7147,13 +7175,11 @@ static inline void mc1231a_receiver_init(mc1231a_receiver_t *receiver)
 }
 
 /* The frame of the last MC1231A_EVENT_FRAME. */
-static inline mc1231a_frame_t mc1231a_receiver_frame(const mc1231a_receiver_t *receiver)
+static inline void mc1231a_receiver_read(const mc1231a_receiver_t *receiver, mc1231a_frame_t *frame)
 {
-    mc1231a_frame_t frame;
-    frame.id = receiver->id;
-    frame.size = receiver->count;
-    frame.payload = receiver->payload;
-    return frame;
+    frame->id = receiver->id;
+    frame->size = receiver->count;
+    frame->payload = receiver->payload;
 }
 
 /* Processes the next byte; returns the event that it completed. */
@@ -7173,6 +7199,126 @@ static inline mc1231a_event_t mc1231a_receive(mc1231a_receiver_t *receiver, uint
     }
     receiver->inside = receiver->count < receiver->expected;
     return receiver->inside ? MC1231A_EVENT_NONE : MC1231A_EVENT_FRAME;
+}
+
+#if !defined(__SDCC) && !defined(SDCC) /* functions of SDCC cannot return structs */
+static inline mc1231a_frame_t mc1231a_receiver_frame(const mc1231a_receiver_t *receiver)
+{
+    mc1231a_frame_t frame;
+    mc1231a_receiver_read(receiver, &frame);
+    return frame;
+}
+#endif
+
+/* Processes bytes in a row, such as those that DMA has stored, up to the first event; returns their number. Handle the
+ * event, then call it again with the others. */
+static inline size_t mc1231a_receive_bytes(
+    mc1231a_receiver_t *receiver, const uint8_t *bytes, size_t size, mc1231a_event_t *event)
+{
+    size_t taken = 0U;
+    mc1231a_event_t found = MC1231A_EVENT_NONE;
+    while ((found == MC1231A_EVENT_NONE) && (taken < size)) {
+        found = mc1231a_receive(receiver, bytes[taken]);
+        ++taken;
+    }
+    *event = found;
+    return taken;
+}
+
+/* Numbers of events since it was set to zeros: of[MC1231A_EVENT_CRC]. */
+typedef struct mc1231a_event_counts {
+    uint32_t of[9];
+} mc1231a_event_counts_t;
+
+/* Counts what mc1231a_receive returned. */
+static inline void mc1231a_count_event(mc1231a_event_counts_t *counts, mc1231a_event_t event)
+{
+    if (event != MC1231A_EVENT_NONE) {
+        ++counts->of[event];
+    }
+}
+
+/* ---- Between an interrupt and the main loop ----
+ * Both boxes start as zeros. MC1231A_FENCE keeps the compiler from moving accesses across it; on a processor with
+ * several cores define it as a memory barrier. */
+#ifndef MC1231A_FENCE
+#if defined(__GNUC__)
+#define MC1231A_FENCE() __asm__ volatile("" : : : "memory")
+#else
+#define MC1231A_FENCE() ((void)0)
+#endif
+#endif
+
+/* A copy of one frame, which the receiver may no longer have when it is handled. */
+typedef struct mc1231a_inbox {
+    volatile bool full;
+    mc1231a_frame_t frame;
+    uint8_t payload[MC1231A_MAX_PAYLOAD_SIZE];
+} mc1231a_inbox_t;
+
+/* In the interrupt: stores a frame; returns false, and drops it, if the one before is still in use. */
+static inline bool mc1231a_inbox_put(mc1231a_inbox_t *inbox, const mc1231a_frame_t *frame)
+{
+    if (inbox->full || (frame->size > sizeof inbox->payload)) {
+        return false;
+    }
+    MC1231A_FENCE();
+    inbox->frame = *frame;
+    for (size_t index = 0U; index < frame->size; ++index) {
+        inbox->payload[index] = frame->payload[index];
+    }
+    inbox->frame.payload = inbox->payload;
+    MC1231A_FENCE();
+    inbox->full = true;
+    return true;
+}
+
+/* In the main loop: the frame, NULL without one. It is valid until mc1231a_inbox_clear. */
+static inline const mc1231a_frame_t *mc1231a_inbox_frame(const mc1231a_inbox_t *inbox)
+{
+    const bool full = inbox->full;
+    MC1231A_FENCE();
+    return full ? &inbox->frame : NULL;
+}
+
+/* In the main loop: makes room for the next frame. */
+static inline void mc1231a_inbox_clear(mc1231a_inbox_t *inbox)
+{
+    MC1231A_FENCE();
+    inbox->full = false;
+}
+
+/* A frame that is sent byte by byte: write it to `wire`, then start it. */
+typedef struct mc1231a_outbox {
+    volatile bool busy; /* until the last byte has been taken; `wire` must not be written */
+    uint8_t size;
+    uint8_t sent;
+    uint8_t wire[MC1231A_MAX_WIRE_SIZE];
+} mc1231a_outbox_t;
+
+/* In the main loop: `size` bytes in `wire` are to be sent; then enable the interrupt of an empty data register. */
+static inline void mc1231a_outbox_start(mc1231a_outbox_t *outbox, size_t size)
+{
+    outbox->size = (uint8_t)size;
+    outbox->sent = 0U;
+    MC1231A_FENCE();
+    outbox->busy = size > 0U;
+}
+
+/* In the interrupt: takes the next byte; returns false if there is none, so that the interrupt can be disabled. */
+static inline bool mc1231a_outbox_next(mc1231a_outbox_t *outbox, uint8_t *byte)
+{
+    if (!outbox->busy) {
+        return false;
+    }
+    MC1231A_FENCE();
+    *byte = outbox->wire[outbox->sent];
+    ++outbox->sent;
+    if (outbox->sent >= outbox->size) {
+        MC1231A_FENCE();
+        outbox->busy = false;
+    }
+    return true;
 }
 
 /* ---- Transactions ----
@@ -7800,2103 +7946,3039 @@ static inline mc1231a_event_t mc1231a_receive(mc1231a_receiver_t *receiver, uint
  * `broadcast` is set. */
 typedef struct mc1231a_slave mc1231a_slave_t;
 
+#ifndef MC1231A_CONST_HANDLERS
+#define MC1231A_CONST_HANDLERS 0
+#endif
+#if !MC1231A_CONST_HANDLERS
+#define MC1231A_HANDLER_(slave, command) ((slave)->command)
+#else
+typedef struct mc1231a_slave_handlers mc1231a_slave_handlers_t;
+#if defined(__AVR__)
+#define MC1231A_HANDLERS_STORAGE PROGMEM
+#define MC1231A_HANDLER_(slave, command) \
+    ((__typeof__((slave)->handlers->command))pgm_read_word(&(slave)->handlers->command))
+#else
+#define MC1231A_HANDLERS_STORAGE
+#define MC1231A_HANDLER_(slave, command) ((slave)->handlers->command)
+#endif
+#endif
+
 struct mc1231a_slave {
     void *context; /* for the application */
-    bool (*set_1)(mc1231a_slave_t *slave, mc1231a_set_1_response_t *response);
-    bool (*set_2)(mc1231a_slave_t *slave, mc1231a_set_2_response_t *response);
-    bool (*set_i)(mc1231a_slave_t *slave, mc1231a_set_i_response_t *response);
-    bool (*set_prfl_s_crv)(mc1231a_slave_t *slave);
-    bool (*set_prfl_trap)(mc1231a_slave_t *slave);
-    bool (*set_prfl_vel)(mc1231a_slave_t *slave);
-    bool (*set_prfl_gear)(mc1231a_slave_t *slave);
-    bool (*set_pos)(mc1231a_slave_t *slave, const mc1231a_set_pos_request_t *request);
-    bool (*set_vel)(mc1231a_slave_t *slave, const mc1231a_set_vel_request_t *request);
-    bool (*set_acc)(mc1231a_slave_t *slave, const mc1231a_set_acc_request_t *request);
-    bool (*set_max_acc)(mc1231a_slave_t *slave, const mc1231a_set_max_acc_request_t *request);
-    bool (*set_jerk)(mc1231a_slave_t *slave, const mc1231a_set_jerk_request_t *request);
-    bool (*set_ratio)(mc1231a_slave_t *slave, const mc1231a_set_ratio_request_t *request);
-    bool (*stop)(mc1231a_slave_t *slave);
-    bool (*smooth_stop)(mc1231a_slave_t *slave);
-    bool (*synch_prfl)(mc1231a_slave_t *slave);
-    bool (*get_pos)(mc1231a_slave_t *slave, mc1231a_get_pos_response_t *response);
-    bool (*get_vel)(mc1231a_slave_t *slave, mc1231a_get_vel_response_t *response);
-    bool (*get_acc)(mc1231a_slave_t *slave, mc1231a_get_acc_response_t *response);
-    bool (*get_max_acc)(mc1231a_slave_t *slave, mc1231a_get_max_acc_response_t *response);
-    bool (*get_jerk)(mc1231a_slave_t *slave, mc1231a_get_jerk_response_t *response);
-    bool (*get_ratio)(mc1231a_slave_t *slave, mc1231a_get_ratio_response_t *response);
-    bool (*get_trgt_pos)(mc1231a_slave_t *slave, mc1231a_get_trgt_pos_response_t *response);
-    bool (*get_trgt_vel)(mc1231a_slave_t *slave, mc1231a_get_trgt_vel_response_t *response);
-    bool (*set_kp)(mc1231a_slave_t *slave, const mc1231a_set_kp_request_t *request);
-    bool (*set_kd)(mc1231a_slave_t *slave, const mc1231a_set_kd_request_t *request);
-    bool (*set_ki)(mc1231a_slave_t *slave, const mc1231a_set_ki_request_t *request);
-    bool (*set_kvff)(mc1231a_slave_t *slave, const mc1231a_set_kvff_request_t *request);
-    bool (*set_i_lm)(mc1231a_slave_t *slave, const mc1231a_set_i_lm_request_t *request);
-    bool (*set_mtr_lmt)(mc1231a_slave_t *slave, const mc1231a_set_mtr_lmt_request_t *request);
-    bool (*set_mtr_bias)(mc1231a_slave_t *slave, const mc1231a_set_mtr_bias_request_t *request);
-    bool (*set_pos_err)(mc1231a_slave_t *slave, const mc1231a_set_pos_err_request_t *request);
-    bool (*get_kp)(mc1231a_slave_t *slave, mc1231a_get_kp_response_t *response);
-    bool (*get_kd)(mc1231a_slave_t *slave, mc1231a_get_kd_response_t *response);
-    bool (*get_ki)(mc1231a_slave_t *slave, mc1231a_get_ki_response_t *response);
-    bool (*get_kvff)(mc1231a_slave_t *slave, mc1231a_get_kvff_response_t *response);
-    bool (*get_i_lm)(mc1231a_slave_t *slave, mc1231a_get_i_lm_response_t *response);
-    bool (*get_mtr_lmt)(mc1231a_slave_t *slave, mc1231a_get_mtr_lmt_response_t *response);
-    bool (*get_mtr_bias)(mc1231a_slave_t *slave, mc1231a_get_mtr_bias_response_t *response);
-    bool (*get_pos_err)(mc1231a_slave_t *slave, mc1231a_get_pos_err_response_t *response);
-    bool (*get_intgr)(mc1231a_slave_t *slave, mc1231a_get_intgr_response_t *response);
-    bool (*get_actl_pos_err)(mc1231a_slave_t *slave, mc1231a_get_actl_pos_err_response_t *response);
-    bool (*set_auto_stop_on)(mc1231a_slave_t *slave);
-    bool (*set_auto_stop_off)(mc1231a_slave_t *slave);
-    bool (*set_time_brk)(mc1231a_slave_t *slave);
-    bool (*set_pos_brk)(mc1231a_slave_t *slave);
-    bool (*set_neg_brk)(mc1231a_slave_t *slave);
-    bool (*set_actl_pos_brk)(mc1231a_slave_t *slave);
-    bool (*set_actl_neg_brk)(mc1231a_slave_t *slave);
-    bool (*set_mtn_cmplt_brk)(mc1231a_slave_t *slave);
-    bool (*set_ext_brk)(mc1231a_slave_t *slave);
-    bool (*set_brk_off)(mc1231a_slave_t *slave);
-    bool (*set_brk_pnt)(mc1231a_slave_t *slave, const mc1231a_set_brk_pnt_request_t *request);
-    bool (*update)(mc1231a_slave_t *slave);
-    bool (*multi_update)(mc1231a_slave_t *slave, const mc1231a_multi_update_request_t *request);
-    bool (*set_auto_update_on)(mc1231a_slave_t *slave);
-    bool (*set_auto_update_off)(mc1231a_slave_t *slave);
-    bool (*get_brk_pnt)(mc1231a_slave_t *slave, mc1231a_get_brk_pnt_response_t *response);
-    bool (*set_intrpt_mask)(mc1231a_slave_t *slave, const mc1231a_set_intrpt_mask_request_t *request);
-    bool (*get_intrpt)(mc1231a_slave_t *slave, mc1231a_get_intrpt_response_t *response);
-    bool (*rst_intrpt)(mc1231a_slave_t *slave, const mc1231a_rst_intrpt_request_t *request);
-    bool (*get_intrpt_mask)(mc1231a_slave_t *slave, mc1231a_get_intrpt_mask_response_t *response);
-    bool (*clr_status)(mc1231a_slave_t *slave);
-    bool (*rst_status)(mc1231a_slave_t *slave, const mc1231a_rst_status_request_t *request);
-    bool (*get_status)(mc1231a_slave_t *slave, mc1231a_get_status_response_t *response);
-    bool (*get_mode)(mc1231a_slave_t *slave, mc1231a_get_mode_response_t *response);
-    bool (*set_capt_index)(mc1231a_slave_t *slave);
-    bool (*set_capt_home)(mc1231a_slave_t *slave);
-    bool (*get_capt)(mc1231a_slave_t *slave, mc1231a_get_capt_response_t *response);
-    bool (*set_output_pwm)(mc1231a_slave_t *slave);
-    bool (*set_output_dac16)(mc1231a_slave_t *slave);
-    bool (*mtr_on)(mc1231a_slave_t *slave);
-    bool (*mtr_off)(mc1231a_slave_t *slave);
-    bool (*set_mtr_cmd)(mc1231a_slave_t *slave, const mc1231a_set_mtr_cmd_request_t *request);
-    bool (*get_mtr_cmd)(mc1231a_slave_t *slave, mc1231a_get_mtr_cmd_response_t *response);
-    bool (*set_buf_mtr_cmd)(mc1231a_slave_t *slave, const mc1231a_set_buf_mtr_cmd_request_t *request);
-    bool (*get_buf_mtr_cmd)(mc1231a_slave_t *slave, mc1231a_get_buf_mtr_cmd_response_t *response);
-    bool (*get_output_mode)(mc1231a_slave_t *slave, mc1231a_get_output_mode_response_t *response);
-    bool (*axis_on)(mc1231a_slave_t *slave);
-    bool (*axis_off)(mc1231a_slave_t *slave);
-    bool (*set_actl_pos)(mc1231a_slave_t *slave, const mc1231a_set_actl_pos_request_t *request);
-    bool (*get_actl_pos)(mc1231a_slave_t *slave, mc1231a_get_actl_pos_response_t *response);
-    bool (*set_lmt_sense)(mc1231a_slave_t *slave, const mc1231a_set_lmt_sense_request_t *request);
-    bool (*get_lmt_swtch)(mc1231a_slave_t *slave, mc1231a_get_lmt_swtch_response_t *response);
-    bool (*lmts_on)(mc1231a_slave_t *slave);
-    bool (*lmts_off)(mc1231a_slave_t *slave);
-    bool (*get_home)(mc1231a_slave_t *slave, mc1231a_get_home_response_t *response);
-    bool (*set_smpl_time)(mc1231a_slave_t *slave, const mc1231a_set_smpl_time_request_t *request);
-    bool (*get_smpl_time)(mc1231a_slave_t *slave, mc1231a_get_smpl_time_response_t *response);
-    bool (*reset)(mc1231a_slave_t *slave);
-    bool (*get_vrsn)(mc1231a_slave_t *slave, mc1231a_get_vrsn_response_t *response);
-    bool (*get_time)(mc1231a_slave_t *slave, mc1231a_get_time_response_t *response);
-    bool (*set_phase_cnts)(mc1231a_slave_t *slave, const mc1231a_set_phase_cnts_request_t *request);
-    bool (*set_phase_offset)(mc1231a_slave_t *slave, const mc1231a_set_phase_offset_request_t *request);
-    bool (*set_phase_time)(mc1231a_slave_t *slave, const mc1231a_set_phase_time_request_t *request);
-    bool (*set_phase)(mc1231a_slave_t *slave, const mc1231a_set_phase_request_t *request);
-    bool (*init_phase)(mc1231a_slave_t *slave);
-    bool (*get_phase_info)(mc1231a_slave_t *slave, mc1231a_get_phase_info_response_t *response);
-    bool (*get_phase_cnts)(mc1231a_slave_t *slave, mc1231a_get_phase_cnts_response_t *response);
-    bool (*get_phase_time)(mc1231a_slave_t *slave, mc1231a_get_phase_time_response_t *response);
-    bool (*get_phase_offset)(mc1231a_slave_t *slave, mc1231a_get_phase_offset_response_t *response);
+#if MC1231A_CONST_HANDLERS
+    const struct mc1231a_slave_handlers *handlers;
 };
 
+/* Define it const, and on AVR with MC1231A_HANDLERS_STORAGE, which places it in flash. */
+struct mc1231a_slave_handlers {
+#endif
+#ifndef MC1231A_WITHOUT_SET_1
+    bool (*set_1)(mc1231a_slave_t *slave, mc1231a_set_1_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_SET_2
+    bool (*set_2)(mc1231a_slave_t *slave, mc1231a_set_2_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_SET_I
+    bool (*set_i)(mc1231a_slave_t *slave, mc1231a_set_i_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PRFL_S_CRV
+    bool (*set_prfl_s_crv)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PRFL_TRAP
+    bool (*set_prfl_trap)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PRFL_VEL
+    bool (*set_prfl_vel)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PRFL_GEAR
+    bool (*set_prfl_gear)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_POS
+    bool (*set_pos)(mc1231a_slave_t *slave, const mc1231a_set_pos_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_VEL
+    bool (*set_vel)(mc1231a_slave_t *slave, const mc1231a_set_vel_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_ACC
+    bool (*set_acc)(mc1231a_slave_t *slave, const mc1231a_set_acc_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_MAX_ACC
+    bool (*set_max_acc)(mc1231a_slave_t *slave, const mc1231a_set_max_acc_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_JERK
+    bool (*set_jerk)(mc1231a_slave_t *slave, const mc1231a_set_jerk_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_RATIO
+    bool (*set_ratio)(mc1231a_slave_t *slave, const mc1231a_set_ratio_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_STOP
+    bool (*stop)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SMOOTH_STOP
+    bool (*smooth_stop)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SYNCH_PRFL
+    bool (*synch_prfl)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_GET_POS
+    bool (*get_pos)(mc1231a_slave_t *slave, mc1231a_get_pos_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_VEL
+    bool (*get_vel)(mc1231a_slave_t *slave, mc1231a_get_vel_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_ACC
+    bool (*get_acc)(mc1231a_slave_t *slave, mc1231a_get_acc_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_MAX_ACC
+    bool (*get_max_acc)(mc1231a_slave_t *slave, mc1231a_get_max_acc_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_JERK
+    bool (*get_jerk)(mc1231a_slave_t *slave, mc1231a_get_jerk_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_RATIO
+    bool (*get_ratio)(mc1231a_slave_t *slave, mc1231a_get_ratio_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_TRGT_POS
+    bool (*get_trgt_pos)(mc1231a_slave_t *slave, mc1231a_get_trgt_pos_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_TRGT_VEL
+    bool (*get_trgt_vel)(mc1231a_slave_t *slave, mc1231a_get_trgt_vel_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_SET_KP
+    bool (*set_kp)(mc1231a_slave_t *slave, const mc1231a_set_kp_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_KD
+    bool (*set_kd)(mc1231a_slave_t *slave, const mc1231a_set_kd_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_KI
+    bool (*set_ki)(mc1231a_slave_t *slave, const mc1231a_set_ki_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_KVFF
+    bool (*set_kvff)(mc1231a_slave_t *slave, const mc1231a_set_kvff_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_I_LM
+    bool (*set_i_lm)(mc1231a_slave_t *slave, const mc1231a_set_i_lm_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_MTR_LMT
+    bool (*set_mtr_lmt)(mc1231a_slave_t *slave, const mc1231a_set_mtr_lmt_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_MTR_BIAS
+    bool (*set_mtr_bias)(mc1231a_slave_t *slave, const mc1231a_set_mtr_bias_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_POS_ERR
+    bool (*set_pos_err)(mc1231a_slave_t *slave, const mc1231a_set_pos_err_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_GET_KP
+    bool (*get_kp)(mc1231a_slave_t *slave, mc1231a_get_kp_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_KD
+    bool (*get_kd)(mc1231a_slave_t *slave, mc1231a_get_kd_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_KI
+    bool (*get_ki)(mc1231a_slave_t *slave, mc1231a_get_ki_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_KVFF
+    bool (*get_kvff)(mc1231a_slave_t *slave, mc1231a_get_kvff_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_I_LM
+    bool (*get_i_lm)(mc1231a_slave_t *slave, mc1231a_get_i_lm_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_MTR_LMT
+    bool (*get_mtr_lmt)(mc1231a_slave_t *slave, mc1231a_get_mtr_lmt_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_MTR_BIAS
+    bool (*get_mtr_bias)(mc1231a_slave_t *slave, mc1231a_get_mtr_bias_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_POS_ERR
+    bool (*get_pos_err)(mc1231a_slave_t *slave, mc1231a_get_pos_err_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_INTGR
+    bool (*get_intgr)(mc1231a_slave_t *slave, mc1231a_get_intgr_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_ACTL_POS_ERR
+    bool (*get_actl_pos_err)(mc1231a_slave_t *slave, mc1231a_get_actl_pos_err_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_SET_AUTO_STOP_ON
+    bool (*set_auto_stop_on)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_AUTO_STOP_OFF
+    bool (*set_auto_stop_off)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_TIME_BRK
+    bool (*set_time_brk)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_POS_BRK
+    bool (*set_pos_brk)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_NEG_BRK
+    bool (*set_neg_brk)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_ACTL_POS_BRK
+    bool (*set_actl_pos_brk)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_ACTL_NEG_BRK
+    bool (*set_actl_neg_brk)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_MTN_CMPLT_BRK
+    bool (*set_mtn_cmplt_brk)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_EXT_BRK
+    bool (*set_ext_brk)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_BRK_OFF
+    bool (*set_brk_off)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_BRK_PNT
+    bool (*set_brk_pnt)(mc1231a_slave_t *slave, const mc1231a_set_brk_pnt_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_UPDATE
+    bool (*update)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_MULTI_UPDATE
+    bool (*multi_update)(mc1231a_slave_t *slave, const mc1231a_multi_update_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_AUTO_UPDATE_ON
+    bool (*set_auto_update_on)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_AUTO_UPDATE_OFF
+    bool (*set_auto_update_off)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_GET_BRK_PNT
+    bool (*get_brk_pnt)(mc1231a_slave_t *slave, mc1231a_get_brk_pnt_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_SET_INTRPT_MASK
+    bool (*set_intrpt_mask)(mc1231a_slave_t *slave, const mc1231a_set_intrpt_mask_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_GET_INTRPT
+    bool (*get_intrpt)(mc1231a_slave_t *slave, mc1231a_get_intrpt_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_RST_INTRPT
+    bool (*rst_intrpt)(mc1231a_slave_t *slave, const mc1231a_rst_intrpt_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_GET_INTRPT_MASK
+    bool (*get_intrpt_mask)(mc1231a_slave_t *slave, mc1231a_get_intrpt_mask_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_CLR_STATUS
+    bool (*clr_status)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_RST_STATUS
+    bool (*rst_status)(mc1231a_slave_t *slave, const mc1231a_rst_status_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_GET_STATUS
+    bool (*get_status)(mc1231a_slave_t *slave, mc1231a_get_status_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_MODE
+    bool (*get_mode)(mc1231a_slave_t *slave, mc1231a_get_mode_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_SET_CAPT_INDEX
+    bool (*set_capt_index)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_CAPT_HOME
+    bool (*set_capt_home)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_GET_CAPT
+    bool (*get_capt)(mc1231a_slave_t *slave, mc1231a_get_capt_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_SET_OUTPUT_PWM
+    bool (*set_output_pwm)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_OUTPUT_DAC16
+    bool (*set_output_dac16)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_MTR_ON
+    bool (*mtr_on)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_MTR_OFF
+    bool (*mtr_off)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_MTR_CMD
+    bool (*set_mtr_cmd)(mc1231a_slave_t *slave, const mc1231a_set_mtr_cmd_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_GET_MTR_CMD
+    bool (*get_mtr_cmd)(mc1231a_slave_t *slave, mc1231a_get_mtr_cmd_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_SET_BUF_MTR_CMD
+    bool (*set_buf_mtr_cmd)(mc1231a_slave_t *slave, const mc1231a_set_buf_mtr_cmd_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_GET_BUF_MTR_CMD
+    bool (*get_buf_mtr_cmd)(mc1231a_slave_t *slave, mc1231a_get_buf_mtr_cmd_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_OUTPUT_MODE
+    bool (*get_output_mode)(mc1231a_slave_t *slave, mc1231a_get_output_mode_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_AXIS_ON
+    bool (*axis_on)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_AXIS_OFF
+    bool (*axis_off)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_SET_ACTL_POS
+    bool (*set_actl_pos)(mc1231a_slave_t *slave, const mc1231a_set_actl_pos_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_GET_ACTL_POS
+    bool (*get_actl_pos)(mc1231a_slave_t *slave, mc1231a_get_actl_pos_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_SET_LMT_SENSE
+    bool (*set_lmt_sense)(mc1231a_slave_t *slave, const mc1231a_set_lmt_sense_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_GET_LMT_SWTCH
+    bool (*get_lmt_swtch)(mc1231a_slave_t *slave, mc1231a_get_lmt_swtch_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_LMTS_ON
+    bool (*lmts_on)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_LMTS_OFF
+    bool (*lmts_off)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_GET_HOME
+    bool (*get_home)(mc1231a_slave_t *slave, mc1231a_get_home_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_SET_SMPL_TIME
+    bool (*set_smpl_time)(mc1231a_slave_t *slave, const mc1231a_set_smpl_time_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_GET_SMPL_TIME
+    bool (*get_smpl_time)(mc1231a_slave_t *slave, mc1231a_get_smpl_time_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_RESET
+    bool (*reset)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_GET_VRSN
+    bool (*get_vrsn)(mc1231a_slave_t *slave, mc1231a_get_vrsn_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_TIME
+    bool (*get_time)(mc1231a_slave_t *slave, mc1231a_get_time_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PHASE_CNTS
+    bool (*set_phase_cnts)(mc1231a_slave_t *slave, const mc1231a_set_phase_cnts_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PHASE_OFFSET
+    bool (*set_phase_offset)(mc1231a_slave_t *slave, const mc1231a_set_phase_offset_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PHASE_TIME
+    bool (*set_phase_time)(mc1231a_slave_t *slave, const mc1231a_set_phase_time_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PHASE
+    bool (*set_phase)(mc1231a_slave_t *slave, const mc1231a_set_phase_request_t *request);
+#endif
+#ifndef MC1231A_WITHOUT_INIT_PHASE
+    bool (*init_phase)(mc1231a_slave_t *slave);
+#endif
+#ifndef MC1231A_WITHOUT_GET_PHASE_INFO
+    bool (*get_phase_info)(mc1231a_slave_t *slave, mc1231a_get_phase_info_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_PHASE_CNTS
+    bool (*get_phase_cnts)(mc1231a_slave_t *slave, mc1231a_get_phase_cnts_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_PHASE_TIME
+    bool (*get_phase_time)(mc1231a_slave_t *slave, mc1231a_get_phase_time_response_t *response);
+#endif
+#ifndef MC1231A_WITHOUT_GET_PHASE_OFFSET
+    bool (*get_phase_offset)(mc1231a_slave_t *slave, mc1231a_get_phase_offset_response_t *response);
+#endif
+};
+
+#ifndef MC1231A_WITHOUT_SET_1
 static inline int mc1231a_slave_set_1_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_1_response_t response = MC1231A_SET_1_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->set_1 == NULL) {
+    if (MC1231A_HANDLER_(slave, set_1) == NULL) {
         return mc1231a_reject_(MC1231A_SET_1_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_1)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, set_1)(slave, &response);
         if (answers) {
             size = mc1231a_set_1_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_2
 static inline int mc1231a_slave_set_2_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_2_response_t response = MC1231A_SET_2_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->set_2 == NULL) {
+    if (MC1231A_HANDLER_(slave, set_2) == NULL) {
         return mc1231a_reject_(MC1231A_SET_2_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_2)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, set_2)(slave, &response);
         if (answers) {
             size = mc1231a_set_2_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_I
 static inline int mc1231a_slave_set_i_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_i_response_t response = MC1231A_SET_I_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->set_i == NULL) {
+    if (MC1231A_HANDLER_(slave, set_i) == NULL) {
         return mc1231a_reject_(MC1231A_SET_I_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_i)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, set_i)(slave, &response);
         if (answers) {
             size = mc1231a_set_i_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_PRFL_S_CRV
 static inline int mc1231a_slave_set_prfl_s_crv_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_prfl_s_crv == NULL) {
+    if (MC1231A_HANDLER_(slave, set_prfl_s_crv) == NULL) {
         return mc1231a_reject_(MC1231A_SET_PRFL_S_CRV_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_prfl_s_crv)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_prfl_s_crv)(slave);
         if (answers) {
             size = mc1231a_set_prfl_s_crv_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_PRFL_TRAP
 static inline int mc1231a_slave_set_prfl_trap_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_prfl_trap == NULL) {
+    if (MC1231A_HANDLER_(slave, set_prfl_trap) == NULL) {
         return mc1231a_reject_(MC1231A_SET_PRFL_TRAP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_prfl_trap)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_prfl_trap)(slave);
         if (answers) {
             size = mc1231a_set_prfl_trap_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_PRFL_VEL
 static inline int mc1231a_slave_set_prfl_vel_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_prfl_vel == NULL) {
+    if (MC1231A_HANDLER_(slave, set_prfl_vel) == NULL) {
         return mc1231a_reject_(MC1231A_SET_PRFL_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_prfl_vel)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_prfl_vel)(slave);
         if (answers) {
             size = mc1231a_set_prfl_vel_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_PRFL_GEAR
 static inline int mc1231a_slave_set_prfl_gear_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_prfl_gear == NULL) {
+    if (MC1231A_HANDLER_(slave, set_prfl_gear) == NULL) {
         return mc1231a_reject_(MC1231A_SET_PRFL_GEAR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_prfl_gear)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_prfl_gear)(slave);
         if (answers) {
             size = mc1231a_set_prfl_gear_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_POS
 static inline int mc1231a_slave_set_pos_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_pos_request_t request;
     int size = 0;
 
-    if (slave->set_pos == NULL) {
+    if (MC1231A_HANDLER_(slave, set_pos) == NULL) {
         return mc1231a_reject_(MC1231A_SET_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_pos_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_pos)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_pos)(slave, &request);
         if (answers) {
             size = mc1231a_set_pos_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_VEL
 static inline int mc1231a_slave_set_vel_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_vel_request_t request;
     int size = 0;
 
-    if (slave->set_vel == NULL) {
+    if (MC1231A_HANDLER_(slave, set_vel) == NULL) {
         return mc1231a_reject_(MC1231A_SET_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_vel_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_vel)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_vel)(slave, &request);
         if (answers) {
             size = mc1231a_set_vel_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_ACC
 static inline int mc1231a_slave_set_acc_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_acc_request_t request;
     int size = 0;
 
-    if (slave->set_acc == NULL) {
+    if (MC1231A_HANDLER_(slave, set_acc) == NULL) {
         return mc1231a_reject_(MC1231A_SET_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_acc_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_acc)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_acc)(slave, &request);
         if (answers) {
             size = mc1231a_set_acc_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_MAX_ACC
 static inline int mc1231a_slave_set_max_acc_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_max_acc_request_t request;
     int size = 0;
 
-    if (slave->set_max_acc == NULL) {
+    if (MC1231A_HANDLER_(slave, set_max_acc) == NULL) {
         return mc1231a_reject_(MC1231A_SET_MAX_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_max_acc_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_max_acc)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_max_acc)(slave, &request);
         if (answers) {
             size = mc1231a_set_max_acc_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_JERK
 static inline int mc1231a_slave_set_jerk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_jerk_request_t request;
     int size = 0;
 
-    if (slave->set_jerk == NULL) {
+    if (MC1231A_HANDLER_(slave, set_jerk) == NULL) {
         return mc1231a_reject_(MC1231A_SET_JERK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_jerk_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_jerk)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_jerk)(slave, &request);
         if (answers) {
             size = mc1231a_set_jerk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_RATIO
 static inline int mc1231a_slave_set_ratio_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_ratio_request_t request;
     int size = 0;
 
-    if (slave->set_ratio == NULL) {
+    if (MC1231A_HANDLER_(slave, set_ratio) == NULL) {
         return mc1231a_reject_(MC1231A_SET_RATIO_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_ratio_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_ratio)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_ratio)(slave, &request);
         if (answers) {
             size = mc1231a_set_ratio_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_STOP
 static inline int mc1231a_slave_stop_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->stop == NULL) {
+    if (MC1231A_HANDLER_(slave, stop) == NULL) {
         return mc1231a_reject_(MC1231A_STOP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->stop)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, stop)(slave);
         if (answers) {
             size = mc1231a_stop_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SMOOTH_STOP
 static inline int mc1231a_slave_smooth_stop_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->smooth_stop == NULL) {
+    if (MC1231A_HANDLER_(slave, smooth_stop) == NULL) {
         return mc1231a_reject_(MC1231A_SMOOTH_STOP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->smooth_stop)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, smooth_stop)(slave);
         if (answers) {
             size = mc1231a_smooth_stop_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SYNCH_PRFL
 static inline int mc1231a_slave_synch_prfl_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->synch_prfl == NULL) {
+    if (MC1231A_HANDLER_(slave, synch_prfl) == NULL) {
         return mc1231a_reject_(MC1231A_SYNCH_PRFL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->synch_prfl)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, synch_prfl)(slave);
         if (answers) {
             size = mc1231a_synch_prfl_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_POS
 static inline int mc1231a_slave_get_pos_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_pos_response_t response = MC1231A_GET_POS_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_pos == NULL) {
+    if (MC1231A_HANDLER_(slave, get_pos) == NULL) {
         return mc1231a_reject_(MC1231A_GET_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_pos)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_pos)(slave, &response);
         if (answers) {
             size = mc1231a_get_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_VEL
 static inline int mc1231a_slave_get_vel_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_vel_response_t response = MC1231A_GET_VEL_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_vel == NULL) {
+    if (MC1231A_HANDLER_(slave, get_vel) == NULL) {
         return mc1231a_reject_(MC1231A_GET_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_vel)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_vel)(slave, &response);
         if (answers) {
             size = mc1231a_get_vel_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_ACC
 static inline int mc1231a_slave_get_acc_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_acc_response_t response = MC1231A_GET_ACC_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_acc == NULL) {
+    if (MC1231A_HANDLER_(slave, get_acc) == NULL) {
         return mc1231a_reject_(MC1231A_GET_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_acc)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_acc)(slave, &response);
         if (answers) {
             size = mc1231a_get_acc_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_MAX_ACC
 static inline int mc1231a_slave_get_max_acc_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_max_acc_response_t response = MC1231A_GET_MAX_ACC_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_max_acc == NULL) {
+    if (MC1231A_HANDLER_(slave, get_max_acc) == NULL) {
         return mc1231a_reject_(MC1231A_GET_MAX_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_max_acc)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_max_acc)(slave, &response);
         if (answers) {
             size = mc1231a_get_max_acc_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_JERK
 static inline int mc1231a_slave_get_jerk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_jerk_response_t response = MC1231A_GET_JERK_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_jerk == NULL) {
+    if (MC1231A_HANDLER_(slave, get_jerk) == NULL) {
         return mc1231a_reject_(MC1231A_GET_JERK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_jerk)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_jerk)(slave, &response);
         if (answers) {
             size = mc1231a_get_jerk_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_RATIO
 static inline int mc1231a_slave_get_ratio_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_ratio_response_t response = MC1231A_GET_RATIO_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_ratio == NULL) {
+    if (MC1231A_HANDLER_(slave, get_ratio) == NULL) {
         return mc1231a_reject_(MC1231A_GET_RATIO_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_ratio)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_ratio)(slave, &response);
         if (answers) {
             size = mc1231a_get_ratio_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_TRGT_POS
 static inline int mc1231a_slave_get_trgt_pos_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_trgt_pos_response_t response = MC1231A_GET_TRGT_POS_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_trgt_pos == NULL) {
+    if (MC1231A_HANDLER_(slave, get_trgt_pos) == NULL) {
         return mc1231a_reject_(MC1231A_GET_TRGT_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_trgt_pos)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_trgt_pos)(slave, &response);
         if (answers) {
             size = mc1231a_get_trgt_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_TRGT_VEL
 static inline int mc1231a_slave_get_trgt_vel_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_trgt_vel_response_t response = MC1231A_GET_TRGT_VEL_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_trgt_vel == NULL) {
+    if (MC1231A_HANDLER_(slave, get_trgt_vel) == NULL) {
         return mc1231a_reject_(MC1231A_GET_TRGT_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_trgt_vel)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_trgt_vel)(slave, &response);
         if (answers) {
             size = mc1231a_get_trgt_vel_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_KP
 static inline int mc1231a_slave_set_kp_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_kp_request_t request;
     int size = 0;
 
-    if (slave->set_kp == NULL) {
+    if (MC1231A_HANDLER_(slave, set_kp) == NULL) {
         return mc1231a_reject_(MC1231A_SET_KP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_kp_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_kp)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_kp)(slave, &request);
         if (answers) {
             size = mc1231a_set_kp_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_KD
 static inline int mc1231a_slave_set_kd_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_kd_request_t request;
     int size = 0;
 
-    if (slave->set_kd == NULL) {
+    if (MC1231A_HANDLER_(slave, set_kd) == NULL) {
         return mc1231a_reject_(MC1231A_SET_KD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_kd_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_kd)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_kd)(slave, &request);
         if (answers) {
             size = mc1231a_set_kd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_KI
 static inline int mc1231a_slave_set_ki_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_ki_request_t request;
     int size = 0;
 
-    if (slave->set_ki == NULL) {
+    if (MC1231A_HANDLER_(slave, set_ki) == NULL) {
         return mc1231a_reject_(MC1231A_SET_KI_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_ki_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_ki)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_ki)(slave, &request);
         if (answers) {
             size = mc1231a_set_ki_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_KVFF
 static inline int mc1231a_slave_set_kvff_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_kvff_request_t request;
     int size = 0;
 
-    if (slave->set_kvff == NULL) {
+    if (MC1231A_HANDLER_(slave, set_kvff) == NULL) {
         return mc1231a_reject_(MC1231A_SET_KVFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_kvff_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_kvff)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_kvff)(slave, &request);
         if (answers) {
             size = mc1231a_set_kvff_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_I_LM
 static inline int mc1231a_slave_set_i_lm_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_i_lm_request_t request;
     int size = 0;
 
-    if (slave->set_i_lm == NULL) {
+    if (MC1231A_HANDLER_(slave, set_i_lm) == NULL) {
         return mc1231a_reject_(MC1231A_SET_I_LM_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_i_lm_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_i_lm)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_i_lm)(slave, &request);
         if (answers) {
             size = mc1231a_set_i_lm_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_MTR_LMT
 static inline int mc1231a_slave_set_mtr_lmt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_mtr_lmt_request_t request;
     int size = 0;
 
-    if (slave->set_mtr_lmt == NULL) {
+    if (MC1231A_HANDLER_(slave, set_mtr_lmt) == NULL) {
         return mc1231a_reject_(MC1231A_SET_MTR_LMT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_mtr_lmt_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_mtr_lmt)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_mtr_lmt)(slave, &request);
         if (answers) {
             size = mc1231a_set_mtr_lmt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_MTR_BIAS
 static inline int mc1231a_slave_set_mtr_bias_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_mtr_bias_request_t request;
     int size = 0;
 
-    if (slave->set_mtr_bias == NULL) {
+    if (MC1231A_HANDLER_(slave, set_mtr_bias) == NULL) {
         return mc1231a_reject_(MC1231A_SET_MTR_BIAS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_mtr_bias_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_mtr_bias)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_mtr_bias)(slave, &request);
         if (answers) {
             size = mc1231a_set_mtr_bias_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_POS_ERR
 static inline int mc1231a_slave_set_pos_err_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_pos_err_request_t request;
     int size = 0;
 
-    if (slave->set_pos_err == NULL) {
+    if (MC1231A_HANDLER_(slave, set_pos_err) == NULL) {
         return mc1231a_reject_(MC1231A_SET_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_pos_err_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_pos_err)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_pos_err)(slave, &request);
         if (answers) {
             size = mc1231a_set_pos_err_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_KP
 static inline int mc1231a_slave_get_kp_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_kp_response_t response = MC1231A_GET_KP_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_kp == NULL) {
+    if (MC1231A_HANDLER_(slave, get_kp) == NULL) {
         return mc1231a_reject_(MC1231A_GET_KP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_kp)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_kp)(slave, &response);
         if (answers) {
             size = mc1231a_get_kp_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_KD
 static inline int mc1231a_slave_get_kd_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_kd_response_t response = MC1231A_GET_KD_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_kd == NULL) {
+    if (MC1231A_HANDLER_(slave, get_kd) == NULL) {
         return mc1231a_reject_(MC1231A_GET_KD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_kd)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_kd)(slave, &response);
         if (answers) {
             size = mc1231a_get_kd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_KI
 static inline int mc1231a_slave_get_ki_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_ki_response_t response = MC1231A_GET_KI_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_ki == NULL) {
+    if (MC1231A_HANDLER_(slave, get_ki) == NULL) {
         return mc1231a_reject_(MC1231A_GET_KI_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_ki)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_ki)(slave, &response);
         if (answers) {
             size = mc1231a_get_ki_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_KVFF
 static inline int mc1231a_slave_get_kvff_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_kvff_response_t response = MC1231A_GET_KVFF_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_kvff == NULL) {
+    if (MC1231A_HANDLER_(slave, get_kvff) == NULL) {
         return mc1231a_reject_(MC1231A_GET_KVFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_kvff)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_kvff)(slave, &response);
         if (answers) {
             size = mc1231a_get_kvff_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_I_LM
 static inline int mc1231a_slave_get_i_lm_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_i_lm_response_t response = MC1231A_GET_I_LM_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_i_lm == NULL) {
+    if (MC1231A_HANDLER_(slave, get_i_lm) == NULL) {
         return mc1231a_reject_(MC1231A_GET_I_LM_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_i_lm)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_i_lm)(slave, &response);
         if (answers) {
             size = mc1231a_get_i_lm_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_MTR_LMT
 static inline int mc1231a_slave_get_mtr_lmt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_mtr_lmt_response_t response = MC1231A_GET_MTR_LMT_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_mtr_lmt == NULL) {
+    if (MC1231A_HANDLER_(slave, get_mtr_lmt) == NULL) {
         return mc1231a_reject_(MC1231A_GET_MTR_LMT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_mtr_lmt)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_mtr_lmt)(slave, &response);
         if (answers) {
             size = mc1231a_get_mtr_lmt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_MTR_BIAS
 static inline int mc1231a_slave_get_mtr_bias_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_mtr_bias_response_t response = MC1231A_GET_MTR_BIAS_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_mtr_bias == NULL) {
+    if (MC1231A_HANDLER_(slave, get_mtr_bias) == NULL) {
         return mc1231a_reject_(MC1231A_GET_MTR_BIAS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_mtr_bias)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_mtr_bias)(slave, &response);
         if (answers) {
             size = mc1231a_get_mtr_bias_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_POS_ERR
 static inline int mc1231a_slave_get_pos_err_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_pos_err_response_t response = MC1231A_GET_POS_ERR_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_pos_err == NULL) {
+    if (MC1231A_HANDLER_(slave, get_pos_err) == NULL) {
         return mc1231a_reject_(MC1231A_GET_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_pos_err)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_pos_err)(slave, &response);
         if (answers) {
             size = mc1231a_get_pos_err_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_INTGR
 static inline int mc1231a_slave_get_intgr_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_intgr_response_t response = MC1231A_GET_INTGR_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_intgr == NULL) {
+    if (MC1231A_HANDLER_(slave, get_intgr) == NULL) {
         return mc1231a_reject_(MC1231A_GET_INTGR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_intgr)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_intgr)(slave, &response);
         if (answers) {
             size = mc1231a_get_intgr_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_ACTL_POS_ERR
 static inline int mc1231a_slave_get_actl_pos_err_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_actl_pos_err_response_t response = MC1231A_GET_ACTL_POS_ERR_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_actl_pos_err == NULL) {
+    if (MC1231A_HANDLER_(slave, get_actl_pos_err) == NULL) {
         return mc1231a_reject_(MC1231A_GET_ACTL_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_actl_pos_err)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_actl_pos_err)(slave, &response);
         if (answers) {
             size = mc1231a_get_actl_pos_err_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_AUTO_STOP_ON
 static inline int mc1231a_slave_set_auto_stop_on_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_auto_stop_on == NULL) {
+    if (MC1231A_HANDLER_(slave, set_auto_stop_on) == NULL) {
         return mc1231a_reject_(MC1231A_SET_AUTO_STOP_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_auto_stop_on)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_auto_stop_on)(slave);
         if (answers) {
             size = mc1231a_set_auto_stop_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_AUTO_STOP_OFF
 static inline int mc1231a_slave_set_auto_stop_off_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_auto_stop_off == NULL) {
+    if (MC1231A_HANDLER_(slave, set_auto_stop_off) == NULL) {
         return mc1231a_reject_(MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_auto_stop_off)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_auto_stop_off)(slave);
         if (answers) {
             size = mc1231a_set_auto_stop_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_TIME_BRK
 static inline int mc1231a_slave_set_time_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_time_brk == NULL) {
+    if (MC1231A_HANDLER_(slave, set_time_brk) == NULL) {
         return mc1231a_reject_(MC1231A_SET_TIME_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_time_brk)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_time_brk)(slave);
         if (answers) {
             size = mc1231a_set_time_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_POS_BRK
 static inline int mc1231a_slave_set_pos_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_pos_brk == NULL) {
+    if (MC1231A_HANDLER_(slave, set_pos_brk) == NULL) {
         return mc1231a_reject_(MC1231A_SET_POS_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_pos_brk)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_pos_brk)(slave);
         if (answers) {
             size = mc1231a_set_pos_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_NEG_BRK
 static inline int mc1231a_slave_set_neg_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_neg_brk == NULL) {
+    if (MC1231A_HANDLER_(slave, set_neg_brk) == NULL) {
         return mc1231a_reject_(MC1231A_SET_NEG_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_neg_brk)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_neg_brk)(slave);
         if (answers) {
             size = mc1231a_set_neg_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_ACTL_POS_BRK
 static inline int mc1231a_slave_set_actl_pos_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_actl_pos_brk == NULL) {
+    if (MC1231A_HANDLER_(slave, set_actl_pos_brk) == NULL) {
         return mc1231a_reject_(MC1231A_SET_ACTL_POS_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_actl_pos_brk)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_actl_pos_brk)(slave);
         if (answers) {
             size = mc1231a_set_actl_pos_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_ACTL_NEG_BRK
 static inline int mc1231a_slave_set_actl_neg_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_actl_neg_brk == NULL) {
+    if (MC1231A_HANDLER_(slave, set_actl_neg_brk) == NULL) {
         return mc1231a_reject_(MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_actl_neg_brk)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_actl_neg_brk)(slave);
         if (answers) {
             size = mc1231a_set_actl_neg_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_MTN_CMPLT_BRK
 static inline int mc1231a_slave_set_mtn_cmplt_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_mtn_cmplt_brk == NULL) {
+    if (MC1231A_HANDLER_(slave, set_mtn_cmplt_brk) == NULL) {
         return mc1231a_reject_(MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_mtn_cmplt_brk)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_mtn_cmplt_brk)(slave);
         if (answers) {
             size = mc1231a_set_mtn_cmplt_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_EXT_BRK
 static inline int mc1231a_slave_set_ext_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_ext_brk == NULL) {
+    if (MC1231A_HANDLER_(slave, set_ext_brk) == NULL) {
         return mc1231a_reject_(MC1231A_SET_EXT_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_ext_brk)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_ext_brk)(slave);
         if (answers) {
             size = mc1231a_set_ext_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_BRK_OFF
 static inline int mc1231a_slave_set_brk_off_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_brk_off == NULL) {
+    if (MC1231A_HANDLER_(slave, set_brk_off) == NULL) {
         return mc1231a_reject_(MC1231A_SET_BRK_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_brk_off)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_brk_off)(slave);
         if (answers) {
             size = mc1231a_set_brk_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_BRK_PNT
 static inline int mc1231a_slave_set_brk_pnt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_brk_pnt_request_t request;
     int size = 0;
 
-    if (slave->set_brk_pnt == NULL) {
+    if (MC1231A_HANDLER_(slave, set_brk_pnt) == NULL) {
         return mc1231a_reject_(MC1231A_SET_BRK_PNT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_brk_pnt_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_brk_pnt)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_brk_pnt)(slave, &request);
         if (answers) {
             size = mc1231a_set_brk_pnt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_UPDATE
 static inline int mc1231a_slave_update_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->update == NULL) {
+    if (MC1231A_HANDLER_(slave, update) == NULL) {
         return mc1231a_reject_(MC1231A_UPDATE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->update)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, update)(slave);
         if (answers) {
             size = mc1231a_update_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_MULTI_UPDATE
 static inline int mc1231a_slave_multi_update_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_multi_update_request_t request;
     int size = 0;
 
-    if (slave->multi_update == NULL) {
+    if (MC1231A_HANDLER_(slave, multi_update) == NULL) {
         return mc1231a_reject_(MC1231A_MULTI_UPDATE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_multi_update_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->multi_update)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, multi_update)(slave, &request);
         if (answers) {
             size = mc1231a_multi_update_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_AUTO_UPDATE_ON
 static inline int mc1231a_slave_set_auto_update_on_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_auto_update_on == NULL) {
+    if (MC1231A_HANDLER_(slave, set_auto_update_on) == NULL) {
         return mc1231a_reject_(MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_auto_update_on)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_auto_update_on)(slave);
         if (answers) {
             size = mc1231a_set_auto_update_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_AUTO_UPDATE_OFF
 static inline int mc1231a_slave_set_auto_update_off_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_auto_update_off == NULL) {
+    if (MC1231A_HANDLER_(slave, set_auto_update_off) == NULL) {
         return mc1231a_reject_(MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_auto_update_off)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_auto_update_off)(slave);
         if (answers) {
             size = mc1231a_set_auto_update_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_BRK_PNT
 static inline int mc1231a_slave_get_brk_pnt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_brk_pnt_response_t response = MC1231A_GET_BRK_PNT_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_brk_pnt == NULL) {
+    if (MC1231A_HANDLER_(slave, get_brk_pnt) == NULL) {
         return mc1231a_reject_(MC1231A_GET_BRK_PNT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_brk_pnt)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_brk_pnt)(slave, &response);
         if (answers) {
             size = mc1231a_get_brk_pnt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_INTRPT_MASK
 static inline int mc1231a_slave_set_intrpt_mask_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_intrpt_mask_request_t request;
     int size = 0;
 
-    if (slave->set_intrpt_mask == NULL) {
+    if (MC1231A_HANDLER_(slave, set_intrpt_mask) == NULL) {
         return mc1231a_reject_(MC1231A_SET_INTRPT_MASK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_intrpt_mask_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_intrpt_mask)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_intrpt_mask)(slave, &request);
         if (answers) {
             size = mc1231a_set_intrpt_mask_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_INTRPT
 static inline int mc1231a_slave_get_intrpt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_intrpt_response_t response = MC1231A_GET_INTRPT_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_intrpt == NULL) {
+    if (MC1231A_HANDLER_(slave, get_intrpt) == NULL) {
         return mc1231a_reject_(MC1231A_GET_INTRPT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_intrpt)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_intrpt)(slave, &response);
         if (answers) {
             size = mc1231a_get_intrpt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_RST_INTRPT
 static inline int mc1231a_slave_rst_intrpt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_rst_intrpt_request_t request;
     int size = 0;
 
-    if (slave->rst_intrpt == NULL) {
+    if (MC1231A_HANDLER_(slave, rst_intrpt) == NULL) {
         return mc1231a_reject_(MC1231A_RST_INTRPT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_rst_intrpt_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->rst_intrpt)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, rst_intrpt)(slave, &request);
         if (answers) {
             size = mc1231a_rst_intrpt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_INTRPT_MASK
 static inline int mc1231a_slave_get_intrpt_mask_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_intrpt_mask_response_t response = MC1231A_GET_INTRPT_MASK_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_intrpt_mask == NULL) {
+    if (MC1231A_HANDLER_(slave, get_intrpt_mask) == NULL) {
         return mc1231a_reject_(MC1231A_GET_INTRPT_MASK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_intrpt_mask)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_intrpt_mask)(slave, &response);
         if (answers) {
             size = mc1231a_get_intrpt_mask_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_CLR_STATUS
 static inline int mc1231a_slave_clr_status_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->clr_status == NULL) {
+    if (MC1231A_HANDLER_(slave, clr_status) == NULL) {
         return mc1231a_reject_(MC1231A_CLR_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->clr_status)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, clr_status)(slave);
         if (answers) {
             size = mc1231a_clr_status_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_RST_STATUS
 static inline int mc1231a_slave_rst_status_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_rst_status_request_t request;
     int size = 0;
 
-    if (slave->rst_status == NULL) {
+    if (MC1231A_HANDLER_(slave, rst_status) == NULL) {
         return mc1231a_reject_(MC1231A_RST_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_rst_status_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->rst_status)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, rst_status)(slave, &request);
         if (answers) {
             size = mc1231a_rst_status_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_STATUS
 static inline int mc1231a_slave_get_status_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_status_response_t response = MC1231A_GET_STATUS_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_status == NULL) {
+    if (MC1231A_HANDLER_(slave, get_status) == NULL) {
         return mc1231a_reject_(MC1231A_GET_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_status)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_status)(slave, &response);
         if (answers) {
             size = mc1231a_get_status_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_MODE
 static inline int mc1231a_slave_get_mode_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_mode_response_t response = MC1231A_GET_MODE_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_mode == NULL) {
+    if (MC1231A_HANDLER_(slave, get_mode) == NULL) {
         return mc1231a_reject_(MC1231A_GET_MODE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_mode)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_mode)(slave, &response);
         if (answers) {
             size = mc1231a_get_mode_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_CAPT_INDEX
 static inline int mc1231a_slave_set_capt_index_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_capt_index == NULL) {
+    if (MC1231A_HANDLER_(slave, set_capt_index) == NULL) {
         return mc1231a_reject_(MC1231A_SET_CAPT_INDEX_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_capt_index)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_capt_index)(slave);
         if (answers) {
             size = mc1231a_set_capt_index_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_CAPT_HOME
 static inline int mc1231a_slave_set_capt_home_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_capt_home == NULL) {
+    if (MC1231A_HANDLER_(slave, set_capt_home) == NULL) {
         return mc1231a_reject_(MC1231A_SET_CAPT_HOME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_capt_home)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_capt_home)(slave);
         if (answers) {
             size = mc1231a_set_capt_home_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_CAPT
 static inline int mc1231a_slave_get_capt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_capt_response_t response = MC1231A_GET_CAPT_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_capt == NULL) {
+    if (MC1231A_HANDLER_(slave, get_capt) == NULL) {
         return mc1231a_reject_(MC1231A_GET_CAPT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_capt)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_capt)(slave, &response);
         if (answers) {
             size = mc1231a_get_capt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_OUTPUT_PWM
 static inline int mc1231a_slave_set_output_pwm_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_output_pwm == NULL) {
+    if (MC1231A_HANDLER_(slave, set_output_pwm) == NULL) {
         return mc1231a_reject_(MC1231A_SET_OUTPUT_PWM_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_output_pwm)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_output_pwm)(slave);
         if (answers) {
             size = mc1231a_set_output_pwm_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_OUTPUT_DAC16
 static inline int mc1231a_slave_set_output_dac16_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->set_output_dac16 == NULL) {
+    if (MC1231A_HANDLER_(slave, set_output_dac16) == NULL) {
         return mc1231a_reject_(MC1231A_SET_OUTPUT_DAC16_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->set_output_dac16)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, set_output_dac16)(slave);
         if (answers) {
             size = mc1231a_set_output_dac16_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_MTR_ON
 static inline int mc1231a_slave_mtr_on_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->mtr_on == NULL) {
+    if (MC1231A_HANDLER_(slave, mtr_on) == NULL) {
         return mc1231a_reject_(MC1231A_MTR_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->mtr_on)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, mtr_on)(slave);
         if (answers) {
             size = mc1231a_mtr_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_MTR_OFF
 static inline int mc1231a_slave_mtr_off_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->mtr_off == NULL) {
+    if (MC1231A_HANDLER_(slave, mtr_off) == NULL) {
         return mc1231a_reject_(MC1231A_MTR_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->mtr_off)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, mtr_off)(slave);
         if (answers) {
             size = mc1231a_mtr_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_MTR_CMD
 static inline int mc1231a_slave_set_mtr_cmd_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_mtr_cmd_request_t request;
     int size = 0;
 
-    if (slave->set_mtr_cmd == NULL) {
+    if (MC1231A_HANDLER_(slave, set_mtr_cmd) == NULL) {
         return mc1231a_reject_(MC1231A_SET_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_mtr_cmd_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_mtr_cmd)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_mtr_cmd)(slave, &request);
         if (answers) {
             size = mc1231a_set_mtr_cmd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_MTR_CMD
 static inline int mc1231a_slave_get_mtr_cmd_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_mtr_cmd_response_t response = MC1231A_GET_MTR_CMD_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_mtr_cmd == NULL) {
+    if (MC1231A_HANDLER_(slave, get_mtr_cmd) == NULL) {
         return mc1231a_reject_(MC1231A_GET_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_mtr_cmd)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_mtr_cmd)(slave, &response);
         if (answers) {
             size = mc1231a_get_mtr_cmd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_BUF_MTR_CMD
 static inline int mc1231a_slave_set_buf_mtr_cmd_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_buf_mtr_cmd_request_t request;
     int size = 0;
 
-    if (slave->set_buf_mtr_cmd == NULL) {
+    if (MC1231A_HANDLER_(slave, set_buf_mtr_cmd) == NULL) {
         return mc1231a_reject_(MC1231A_SET_BUF_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_buf_mtr_cmd_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_buf_mtr_cmd)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_buf_mtr_cmd)(slave, &request);
         if (answers) {
             size = mc1231a_set_buf_mtr_cmd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_BUF_MTR_CMD
 static inline int mc1231a_slave_get_buf_mtr_cmd_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_buf_mtr_cmd_response_t response = MC1231A_GET_BUF_MTR_CMD_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_buf_mtr_cmd == NULL) {
+    if (MC1231A_HANDLER_(slave, get_buf_mtr_cmd) == NULL) {
         return mc1231a_reject_(MC1231A_GET_BUF_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_buf_mtr_cmd)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_buf_mtr_cmd)(slave, &response);
         if (answers) {
             size = mc1231a_get_buf_mtr_cmd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_OUTPUT_MODE
 static inline int mc1231a_slave_get_output_mode_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_output_mode_response_t response = MC1231A_GET_OUTPUT_MODE_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_output_mode == NULL) {
+    if (MC1231A_HANDLER_(slave, get_output_mode) == NULL) {
         return mc1231a_reject_(MC1231A_GET_OUTPUT_MODE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_output_mode)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_output_mode)(slave, &response);
         if (answers) {
             size = mc1231a_get_output_mode_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_AXIS_ON
 static inline int mc1231a_slave_axis_on_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->axis_on == NULL) {
+    if (MC1231A_HANDLER_(slave, axis_on) == NULL) {
         return mc1231a_reject_(MC1231A_AXIS_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->axis_on)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, axis_on)(slave);
         if (answers) {
             size = mc1231a_axis_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_AXIS_OFF
 static inline int mc1231a_slave_axis_off_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->axis_off == NULL) {
+    if (MC1231A_HANDLER_(slave, axis_off) == NULL) {
         return mc1231a_reject_(MC1231A_AXIS_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->axis_off)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, axis_off)(slave);
         if (answers) {
             size = mc1231a_axis_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_ACTL_POS
 static inline int mc1231a_slave_set_actl_pos_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_actl_pos_request_t request;
     int size = 0;
 
-    if (slave->set_actl_pos == NULL) {
+    if (MC1231A_HANDLER_(slave, set_actl_pos) == NULL) {
         return mc1231a_reject_(MC1231A_SET_ACTL_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_actl_pos_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_actl_pos)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_actl_pos)(slave, &request);
         if (answers) {
             size = mc1231a_set_actl_pos_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_ACTL_POS
 static inline int mc1231a_slave_get_actl_pos_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_actl_pos_response_t response = MC1231A_GET_ACTL_POS_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_actl_pos == NULL) {
+    if (MC1231A_HANDLER_(slave, get_actl_pos) == NULL) {
         return mc1231a_reject_(MC1231A_GET_ACTL_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_actl_pos)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_actl_pos)(slave, &response);
         if (answers) {
             size = mc1231a_get_actl_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_LMT_SENSE
 static inline int mc1231a_slave_set_lmt_sense_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_lmt_sense_request_t request;
     int size = 0;
 
-    if (slave->set_lmt_sense == NULL) {
+    if (MC1231A_HANDLER_(slave, set_lmt_sense) == NULL) {
         return mc1231a_reject_(MC1231A_SET_LMT_SENSE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_lmt_sense_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_lmt_sense)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_lmt_sense)(slave, &request);
         if (answers) {
             size = mc1231a_set_lmt_sense_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_LMT_SWTCH
 static inline int mc1231a_slave_get_lmt_swtch_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_lmt_swtch_response_t response = MC1231A_GET_LMT_SWTCH_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_lmt_swtch == NULL) {
+    if (MC1231A_HANDLER_(slave, get_lmt_swtch) == NULL) {
         return mc1231a_reject_(MC1231A_GET_LMT_SWTCH_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_lmt_swtch)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_lmt_swtch)(slave, &response);
         if (answers) {
             size = mc1231a_get_lmt_swtch_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_LMTS_ON
 static inline int mc1231a_slave_lmts_on_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->lmts_on == NULL) {
+    if (MC1231A_HANDLER_(slave, lmts_on) == NULL) {
         return mc1231a_reject_(MC1231A_LMTS_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->lmts_on)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, lmts_on)(slave);
         if (answers) {
             size = mc1231a_lmts_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_LMTS_OFF
 static inline int mc1231a_slave_lmts_off_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->lmts_off == NULL) {
+    if (MC1231A_HANDLER_(slave, lmts_off) == NULL) {
         return mc1231a_reject_(MC1231A_LMTS_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->lmts_off)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, lmts_off)(slave);
         if (answers) {
             size = mc1231a_lmts_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_HOME
 static inline int mc1231a_slave_get_home_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_home_response_t response = MC1231A_GET_HOME_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_home == NULL) {
+    if (MC1231A_HANDLER_(slave, get_home) == NULL) {
         return mc1231a_reject_(MC1231A_GET_HOME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_home)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_home)(slave, &response);
         if (answers) {
             size = mc1231a_get_home_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_SMPL_TIME
 static inline int mc1231a_slave_set_smpl_time_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_smpl_time_request_t request;
     int size = 0;
 
-    if (slave->set_smpl_time == NULL) {
+    if (MC1231A_HANDLER_(slave, set_smpl_time) == NULL) {
         return mc1231a_reject_(MC1231A_SET_SMPL_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_smpl_time_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_smpl_time)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_smpl_time)(slave, &request);
         if (answers) {
             size = mc1231a_set_smpl_time_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_SMPL_TIME
 static inline int mc1231a_slave_get_smpl_time_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_smpl_time_response_t response = MC1231A_GET_SMPL_TIME_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_smpl_time == NULL) {
+    if (MC1231A_HANDLER_(slave, get_smpl_time) == NULL) {
         return mc1231a_reject_(MC1231A_GET_SMPL_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_smpl_time)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_smpl_time)(slave, &response);
         if (answers) {
             size = mc1231a_get_smpl_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_RESET
 static inline int mc1231a_slave_reset_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->reset == NULL) {
+    if (MC1231A_HANDLER_(slave, reset) == NULL) {
         return mc1231a_reject_(MC1231A_RESET_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->reset)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, reset)(slave);
         if (answers) {
             size = mc1231a_reset_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_VRSN
 static inline int mc1231a_slave_get_vrsn_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_vrsn_response_t response = MC1231A_GET_VRSN_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_vrsn == NULL) {
+    if (MC1231A_HANDLER_(slave, get_vrsn) == NULL) {
         return mc1231a_reject_(MC1231A_GET_VRSN_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_vrsn)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_vrsn)(slave, &response);
         if (answers) {
             size = mc1231a_get_vrsn_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_TIME
 static inline int mc1231a_slave_get_time_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_time_response_t response = MC1231A_GET_TIME_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_time == NULL) {
+    if (MC1231A_HANDLER_(slave, get_time) == NULL) {
         return mc1231a_reject_(MC1231A_GET_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_time)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_time)(slave, &response);
         if (answers) {
             size = mc1231a_get_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_PHASE_CNTS
 static inline int mc1231a_slave_set_phase_cnts_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_phase_cnts_request_t request;
     int size = 0;
 
-    if (slave->set_phase_cnts == NULL) {
+    if (MC1231A_HANDLER_(slave, set_phase_cnts) == NULL) {
         return mc1231a_reject_(MC1231A_SET_PHASE_CNTS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_phase_cnts_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_phase_cnts)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_phase_cnts)(slave, &request);
         if (answers) {
             size = mc1231a_set_phase_cnts_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_PHASE_OFFSET
 static inline int mc1231a_slave_set_phase_offset_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_phase_offset_request_t request;
     int size = 0;
 
-    if (slave->set_phase_offset == NULL) {
+    if (MC1231A_HANDLER_(slave, set_phase_offset) == NULL) {
         return mc1231a_reject_(MC1231A_SET_PHASE_OFFSET_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_phase_offset_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_phase_offset)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_phase_offset)(slave, &request);
         if (answers) {
             size = mc1231a_set_phase_offset_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_PHASE_TIME
 static inline int mc1231a_slave_set_phase_time_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_phase_time_request_t request;
     int size = 0;
 
-    if (slave->set_phase_time == NULL) {
+    if (MC1231A_HANDLER_(slave, set_phase_time) == NULL) {
         return mc1231a_reject_(MC1231A_SET_PHASE_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_phase_time_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_phase_time)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_phase_time)(slave, &request);
         if (answers) {
             size = mc1231a_set_phase_time_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_SET_PHASE
 static inline int mc1231a_slave_set_phase_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_phase_request_t request;
     int size = 0;
 
-    if (slave->set_phase == NULL) {
+    if (MC1231A_HANDLER_(slave, set_phase) == NULL) {
         return mc1231a_reject_(MC1231A_SET_PHASE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_phase_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = (slave->set_phase)(slave, &request);
+        const bool answers = MC1231A_HANDLER_(slave, set_phase)(slave, &request);
         if (answers) {
             size = mc1231a_set_phase_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_INIT_PHASE
 static inline int mc1231a_slave_init_phase_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->init_phase == NULL) {
+    if (MC1231A_HANDLER_(slave, init_phase) == NULL) {
         return mc1231a_reject_(MC1231A_INIT_PHASE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->init_phase)(slave);
+        const bool answers = MC1231A_HANDLER_(slave, init_phase)(slave);
         if (answers) {
             size = mc1231a_init_phase_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_PHASE_INFO
 static inline int mc1231a_slave_get_phase_info_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_phase_info_response_t response = MC1231A_GET_PHASE_INFO_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_phase_info == NULL) {
+    if (MC1231A_HANDLER_(slave, get_phase_info) == NULL) {
         return mc1231a_reject_(MC1231A_GET_PHASE_INFO_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_phase_info)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_phase_info)(slave, &response);
         if (answers) {
             size = mc1231a_get_phase_info_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_PHASE_CNTS
 static inline int mc1231a_slave_get_phase_cnts_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_phase_cnts_response_t response = MC1231A_GET_PHASE_CNTS_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_phase_cnts == NULL) {
+    if (MC1231A_HANDLER_(slave, get_phase_cnts) == NULL) {
         return mc1231a_reject_(MC1231A_GET_PHASE_CNTS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_phase_cnts)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_phase_cnts)(slave, &response);
         if (answers) {
             size = mc1231a_get_phase_cnts_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_PHASE_TIME
 static inline int mc1231a_slave_get_phase_time_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_phase_time_response_t response = MC1231A_GET_PHASE_TIME_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_phase_time == NULL) {
+    if (MC1231A_HANDLER_(slave, get_phase_time) == NULL) {
         return mc1231a_reject_(MC1231A_GET_PHASE_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_phase_time)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_phase_time)(slave, &response);
         if (answers) {
             size = mc1231a_get_phase_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef MC1231A_WITHOUT_GET_PHASE_OFFSET
 static inline int mc1231a_slave_get_phase_offset_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_phase_offset_response_t response = MC1231A_GET_PHASE_OFFSET_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->get_phase_offset == NULL) {
+    if (MC1231A_HANDLER_(slave, get_phase_offset) == NULL) {
         return mc1231a_reject_(MC1231A_GET_PHASE_OFFSET_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->get_phase_offset)(slave, &response);
+        const bool answers = MC1231A_HANDLER_(slave, get_phase_offset)(slave, &response);
         if (answers) {
             size = mc1231a_get_phase_offset_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
     }
     return size;
 }
+#endif
 
 /* All requests. */
 static inline int mc1231a_handle_any_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
+    (void)slave; /* unused if all commands are left out */
+    (void)wire;
+    (void)capacity;
     switch (frame->id) {
+#ifndef MC1231A_WITHOUT_SET_1
     case MC1231A_SET_1_REQUEST_ID:
         return mc1231a_slave_set_1_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_1_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_1_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_2
     case MC1231A_SET_2_REQUEST_ID:
         return mc1231a_slave_set_2_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_2_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_2_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_I
     case MC1231A_SET_I_REQUEST_ID:
         return mc1231a_slave_set_i_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_I_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_I_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PRFL_S_CRV
     case MC1231A_SET_PRFL_S_CRV_REQUEST_ID:
         return mc1231a_slave_set_prfl_s_crv_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_PRFL_S_CRV_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_PRFL_S_CRV_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PRFL_TRAP
     case MC1231A_SET_PRFL_TRAP_REQUEST_ID:
         return mc1231a_slave_set_prfl_trap_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_PRFL_TRAP_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_PRFL_TRAP_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PRFL_VEL
     case MC1231A_SET_PRFL_VEL_REQUEST_ID:
         return mc1231a_slave_set_prfl_vel_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_PRFL_VEL_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_PRFL_VEL_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PRFL_GEAR
     case MC1231A_SET_PRFL_GEAR_REQUEST_ID:
         return mc1231a_slave_set_prfl_gear_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_PRFL_GEAR_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_PRFL_GEAR_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_POS
     case MC1231A_SET_POS_REQUEST_ID:
         return mc1231a_slave_set_pos_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_POS_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_POS_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_VEL
     case MC1231A_SET_VEL_REQUEST_ID:
         return mc1231a_slave_set_vel_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_VEL_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_VEL_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_ACC
     case MC1231A_SET_ACC_REQUEST_ID:
         return mc1231a_slave_set_acc_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_ACC_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_ACC_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_MAX_ACC
     case MC1231A_SET_MAX_ACC_REQUEST_ID:
         return mc1231a_slave_set_max_acc_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_MAX_ACC_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_MAX_ACC_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_JERK
     case MC1231A_SET_JERK_REQUEST_ID:
         return mc1231a_slave_set_jerk_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_JERK_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_JERK_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_RATIO
     case MC1231A_SET_RATIO_REQUEST_ID:
         return mc1231a_slave_set_ratio_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_RATIO_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_RATIO_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_STOP
     case MC1231A_STOP_REQUEST_ID:
         return mc1231a_slave_stop_(slave, frame, wire, capacity);
+#else
+    case MC1231A_STOP_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_STOP_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SMOOTH_STOP
     case MC1231A_SMOOTH_STOP_REQUEST_ID:
         return mc1231a_slave_smooth_stop_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SMOOTH_STOP_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SMOOTH_STOP_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SYNCH_PRFL
     case MC1231A_SYNCH_PRFL_REQUEST_ID:
         return mc1231a_slave_synch_prfl_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SYNCH_PRFL_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SYNCH_PRFL_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_POS
     case MC1231A_GET_POS_REQUEST_ID:
         return mc1231a_slave_get_pos_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_POS_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_POS_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_VEL
     case MC1231A_GET_VEL_REQUEST_ID:
         return mc1231a_slave_get_vel_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_VEL_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_VEL_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_ACC
     case MC1231A_GET_ACC_REQUEST_ID:
         return mc1231a_slave_get_acc_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_ACC_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_ACC_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_MAX_ACC
     case MC1231A_GET_MAX_ACC_REQUEST_ID:
         return mc1231a_slave_get_max_acc_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_MAX_ACC_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_MAX_ACC_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_JERK
     case MC1231A_GET_JERK_REQUEST_ID:
         return mc1231a_slave_get_jerk_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_JERK_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_JERK_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_RATIO
     case MC1231A_GET_RATIO_REQUEST_ID:
         return mc1231a_slave_get_ratio_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_RATIO_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_RATIO_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_TRGT_POS
     case MC1231A_GET_TRGT_POS_REQUEST_ID:
         return mc1231a_slave_get_trgt_pos_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_TRGT_POS_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_TRGT_POS_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_TRGT_VEL
     case MC1231A_GET_TRGT_VEL_REQUEST_ID:
         return mc1231a_slave_get_trgt_vel_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_TRGT_VEL_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_TRGT_VEL_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_KP
     case MC1231A_SET_KP_REQUEST_ID:
         return mc1231a_slave_set_kp_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_KP_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_KP_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_KD
     case MC1231A_SET_KD_REQUEST_ID:
         return mc1231a_slave_set_kd_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_KD_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_KD_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_KI
     case MC1231A_SET_KI_REQUEST_ID:
         return mc1231a_slave_set_ki_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_KI_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_KI_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_KVFF
     case MC1231A_SET_KVFF_REQUEST_ID:
         return mc1231a_slave_set_kvff_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_KVFF_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_KVFF_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_I_LM
     case MC1231A_SET_I_LM_REQUEST_ID:
         return mc1231a_slave_set_i_lm_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_I_LM_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_I_LM_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_MTR_LMT
     case MC1231A_SET_MTR_LMT_REQUEST_ID:
         return mc1231a_slave_set_mtr_lmt_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_MTR_LMT_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_MTR_LMT_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_MTR_BIAS
     case MC1231A_SET_MTR_BIAS_REQUEST_ID:
         return mc1231a_slave_set_mtr_bias_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_MTR_BIAS_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_MTR_BIAS_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_POS_ERR
     case MC1231A_SET_POS_ERR_REQUEST_ID:
         return mc1231a_slave_set_pos_err_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_POS_ERR_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_KP
     case MC1231A_GET_KP_REQUEST_ID:
         return mc1231a_slave_get_kp_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_KP_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_KP_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_KD
     case MC1231A_GET_KD_REQUEST_ID:
         return mc1231a_slave_get_kd_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_KD_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_KD_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_KI
     case MC1231A_GET_KI_REQUEST_ID:
         return mc1231a_slave_get_ki_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_KI_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_KI_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_KVFF
     case MC1231A_GET_KVFF_REQUEST_ID:
         return mc1231a_slave_get_kvff_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_KVFF_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_KVFF_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_I_LM
     case MC1231A_GET_I_LM_REQUEST_ID:
         return mc1231a_slave_get_i_lm_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_I_LM_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_I_LM_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_MTR_LMT
     case MC1231A_GET_MTR_LMT_REQUEST_ID:
         return mc1231a_slave_get_mtr_lmt_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_MTR_LMT_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_MTR_LMT_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_MTR_BIAS
     case MC1231A_GET_MTR_BIAS_REQUEST_ID:
         return mc1231a_slave_get_mtr_bias_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_MTR_BIAS_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_MTR_BIAS_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_POS_ERR
     case MC1231A_GET_POS_ERR_REQUEST_ID:
         return mc1231a_slave_get_pos_err_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_POS_ERR_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_INTGR
     case MC1231A_GET_INTGR_REQUEST_ID:
         return mc1231a_slave_get_intgr_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_INTGR_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_INTGR_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_ACTL_POS_ERR
     case MC1231A_GET_ACTL_POS_ERR_REQUEST_ID:
         return mc1231a_slave_get_actl_pos_err_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_ACTL_POS_ERR_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_ACTL_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_AUTO_STOP_ON
     case MC1231A_SET_AUTO_STOP_ON_REQUEST_ID:
         return mc1231a_slave_set_auto_stop_on_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_AUTO_STOP_ON_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_AUTO_STOP_ON_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_AUTO_STOP_OFF
     case MC1231A_SET_AUTO_STOP_OFF_REQUEST_ID:
         return mc1231a_slave_set_auto_stop_off_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_AUTO_STOP_OFF_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_TIME_BRK
     case MC1231A_SET_TIME_BRK_REQUEST_ID:
         return mc1231a_slave_set_time_brk_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_TIME_BRK_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_TIME_BRK_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_POS_BRK
     case MC1231A_SET_POS_BRK_REQUEST_ID:
         return mc1231a_slave_set_pos_brk_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_POS_BRK_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_POS_BRK_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_NEG_BRK
     case MC1231A_SET_NEG_BRK_REQUEST_ID:
         return mc1231a_slave_set_neg_brk_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_NEG_BRK_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_NEG_BRK_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_ACTL_POS_BRK
     case MC1231A_SET_ACTL_POS_BRK_REQUEST_ID:
         return mc1231a_slave_set_actl_pos_brk_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_ACTL_POS_BRK_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_ACTL_POS_BRK_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_ACTL_NEG_BRK
     case MC1231A_SET_ACTL_NEG_BRK_REQUEST_ID:
         return mc1231a_slave_set_actl_neg_brk_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_ACTL_NEG_BRK_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_MTN_CMPLT_BRK
     case MC1231A_SET_MTN_CMPLT_BRK_REQUEST_ID:
         return mc1231a_slave_set_mtn_cmplt_brk_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_MTN_CMPLT_BRK_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_EXT_BRK
     case MC1231A_SET_EXT_BRK_REQUEST_ID:
         return mc1231a_slave_set_ext_brk_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_EXT_BRK_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_EXT_BRK_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_BRK_OFF
     case MC1231A_SET_BRK_OFF_REQUEST_ID:
         return mc1231a_slave_set_brk_off_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_BRK_OFF_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_BRK_OFF_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_BRK_PNT
     case MC1231A_SET_BRK_PNT_REQUEST_ID:
         return mc1231a_slave_set_brk_pnt_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_BRK_PNT_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_BRK_PNT_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_UPDATE
     case MC1231A_UPDATE_REQUEST_ID:
         return mc1231a_slave_update_(slave, frame, wire, capacity);
+#else
+    case MC1231A_UPDATE_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_UPDATE_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_MULTI_UPDATE
     case MC1231A_MULTI_UPDATE_REQUEST_ID:
         return mc1231a_slave_multi_update_(slave, frame, wire, capacity);
+#else
+    case MC1231A_MULTI_UPDATE_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_MULTI_UPDATE_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_AUTO_UPDATE_ON
     case MC1231A_SET_AUTO_UPDATE_ON_REQUEST_ID:
         return mc1231a_slave_set_auto_update_on_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_AUTO_UPDATE_ON_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_AUTO_UPDATE_OFF
     case MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_ID:
         return mc1231a_slave_set_auto_update_off_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_BRK_PNT
     case MC1231A_GET_BRK_PNT_REQUEST_ID:
         return mc1231a_slave_get_brk_pnt_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_BRK_PNT_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_BRK_PNT_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_INTRPT_MASK
     case MC1231A_SET_INTRPT_MASK_REQUEST_ID:
         return mc1231a_slave_set_intrpt_mask_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_INTRPT_MASK_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_INTRPT_MASK_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_INTRPT
     case MC1231A_GET_INTRPT_REQUEST_ID:
         return mc1231a_slave_get_intrpt_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_INTRPT_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_INTRPT_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_RST_INTRPT
     case MC1231A_RST_INTRPT_REQUEST_ID:
         return mc1231a_slave_rst_intrpt_(slave, frame, wire, capacity);
+#else
+    case MC1231A_RST_INTRPT_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_RST_INTRPT_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_INTRPT_MASK
     case MC1231A_GET_INTRPT_MASK_REQUEST_ID:
         return mc1231a_slave_get_intrpt_mask_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_INTRPT_MASK_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_INTRPT_MASK_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_CLR_STATUS
     case MC1231A_CLR_STATUS_REQUEST_ID:
         return mc1231a_slave_clr_status_(slave, frame, wire, capacity);
+#else
+    case MC1231A_CLR_STATUS_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_CLR_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_RST_STATUS
     case MC1231A_RST_STATUS_REQUEST_ID:
         return mc1231a_slave_rst_status_(slave, frame, wire, capacity);
+#else
+    case MC1231A_RST_STATUS_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_RST_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_STATUS
     case MC1231A_GET_STATUS_REQUEST_ID:
         return mc1231a_slave_get_status_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_STATUS_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_MODE
     case MC1231A_GET_MODE_REQUEST_ID:
         return mc1231a_slave_get_mode_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_MODE_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_MODE_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_CAPT_INDEX
     case MC1231A_SET_CAPT_INDEX_REQUEST_ID:
         return mc1231a_slave_set_capt_index_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_CAPT_INDEX_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_CAPT_INDEX_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_CAPT_HOME
     case MC1231A_SET_CAPT_HOME_REQUEST_ID:
         return mc1231a_slave_set_capt_home_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_CAPT_HOME_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_CAPT_HOME_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_CAPT
     case MC1231A_GET_CAPT_REQUEST_ID:
         return mc1231a_slave_get_capt_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_CAPT_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_CAPT_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_OUTPUT_PWM
     case MC1231A_SET_OUTPUT_PWM_REQUEST_ID:
         return mc1231a_slave_set_output_pwm_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_OUTPUT_PWM_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_OUTPUT_PWM_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_OUTPUT_DAC16
     case MC1231A_SET_OUTPUT_DAC16_REQUEST_ID:
         return mc1231a_slave_set_output_dac16_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_OUTPUT_DAC16_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_OUTPUT_DAC16_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_MTR_ON
     case MC1231A_MTR_ON_REQUEST_ID:
         return mc1231a_slave_mtr_on_(slave, frame, wire, capacity);
+#else
+    case MC1231A_MTR_ON_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_MTR_ON_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_MTR_OFF
     case MC1231A_MTR_OFF_REQUEST_ID:
         return mc1231a_slave_mtr_off_(slave, frame, wire, capacity);
+#else
+    case MC1231A_MTR_OFF_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_MTR_OFF_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_MTR_CMD
     case MC1231A_SET_MTR_CMD_REQUEST_ID:
         return mc1231a_slave_set_mtr_cmd_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_MTR_CMD_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_MTR_CMD
     case MC1231A_GET_MTR_CMD_REQUEST_ID:
         return mc1231a_slave_get_mtr_cmd_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_MTR_CMD_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_BUF_MTR_CMD
     case MC1231A_SET_BUF_MTR_CMD_REQUEST_ID:
         return mc1231a_slave_set_buf_mtr_cmd_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_BUF_MTR_CMD_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_BUF_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_BUF_MTR_CMD
     case MC1231A_GET_BUF_MTR_CMD_REQUEST_ID:
         return mc1231a_slave_get_buf_mtr_cmd_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_BUF_MTR_CMD_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_BUF_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_OUTPUT_MODE
     case MC1231A_GET_OUTPUT_MODE_REQUEST_ID:
         return mc1231a_slave_get_output_mode_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_OUTPUT_MODE_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_OUTPUT_MODE_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_AXIS_ON
     case MC1231A_AXIS_ON_REQUEST_ID:
         return mc1231a_slave_axis_on_(slave, frame, wire, capacity);
+#else
+    case MC1231A_AXIS_ON_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_AXIS_ON_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_AXIS_OFF
     case MC1231A_AXIS_OFF_REQUEST_ID:
         return mc1231a_slave_axis_off_(slave, frame, wire, capacity);
+#else
+    case MC1231A_AXIS_OFF_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_AXIS_OFF_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_ACTL_POS
     case MC1231A_SET_ACTL_POS_REQUEST_ID:
         return mc1231a_slave_set_actl_pos_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_ACTL_POS_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_ACTL_POS_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_ACTL_POS
     case MC1231A_GET_ACTL_POS_REQUEST_ID:
         return mc1231a_slave_get_actl_pos_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_ACTL_POS_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_ACTL_POS_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_LMT_SENSE
     case MC1231A_SET_LMT_SENSE_REQUEST_ID:
         return mc1231a_slave_set_lmt_sense_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_LMT_SENSE_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_LMT_SENSE_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_LMT_SWTCH
     case MC1231A_GET_LMT_SWTCH_REQUEST_ID:
         return mc1231a_slave_get_lmt_swtch_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_LMT_SWTCH_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_LMT_SWTCH_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_LMTS_ON
     case MC1231A_LMTS_ON_REQUEST_ID:
         return mc1231a_slave_lmts_on_(slave, frame, wire, capacity);
+#else
+    case MC1231A_LMTS_ON_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_LMTS_ON_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_LMTS_OFF
     case MC1231A_LMTS_OFF_REQUEST_ID:
         return mc1231a_slave_lmts_off_(slave, frame, wire, capacity);
+#else
+    case MC1231A_LMTS_OFF_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_LMTS_OFF_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_HOME
     case MC1231A_GET_HOME_REQUEST_ID:
         return mc1231a_slave_get_home_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_HOME_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_HOME_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_SMPL_TIME
     case MC1231A_SET_SMPL_TIME_REQUEST_ID:
         return mc1231a_slave_set_smpl_time_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_SMPL_TIME_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_SMPL_TIME_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_SMPL_TIME
     case MC1231A_GET_SMPL_TIME_REQUEST_ID:
         return mc1231a_slave_get_smpl_time_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_SMPL_TIME_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_SMPL_TIME_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_RESET
     case MC1231A_RESET_REQUEST_ID:
         return mc1231a_slave_reset_(slave, frame, wire, capacity);
+#else
+    case MC1231A_RESET_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_RESET_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_VRSN
     case MC1231A_GET_VRSN_REQUEST_ID:
         return mc1231a_slave_get_vrsn_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_VRSN_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_VRSN_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_TIME
     case MC1231A_GET_TIME_REQUEST_ID:
         return mc1231a_slave_get_time_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_TIME_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_TIME_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PHASE_CNTS
     case MC1231A_SET_PHASE_CNTS_REQUEST_ID:
         return mc1231a_slave_set_phase_cnts_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_PHASE_CNTS_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_PHASE_CNTS_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PHASE_OFFSET
     case MC1231A_SET_PHASE_OFFSET_REQUEST_ID:
         return mc1231a_slave_set_phase_offset_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_PHASE_OFFSET_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_PHASE_OFFSET_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PHASE_TIME
     case MC1231A_SET_PHASE_TIME_REQUEST_ID:
         return mc1231a_slave_set_phase_time_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_PHASE_TIME_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_PHASE_TIME_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_SET_PHASE
     case MC1231A_SET_PHASE_REQUEST_ID:
         return mc1231a_slave_set_phase_(slave, frame, wire, capacity);
+#else
+    case MC1231A_SET_PHASE_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_SET_PHASE_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_INIT_PHASE
     case MC1231A_INIT_PHASE_REQUEST_ID:
         return mc1231a_slave_init_phase_(slave, frame, wire, capacity);
+#else
+    case MC1231A_INIT_PHASE_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_INIT_PHASE_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_PHASE_INFO
     case MC1231A_GET_PHASE_INFO_REQUEST_ID:
         return mc1231a_slave_get_phase_info_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_PHASE_INFO_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_PHASE_INFO_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_PHASE_CNTS
     case MC1231A_GET_PHASE_CNTS_REQUEST_ID:
         return mc1231a_slave_get_phase_cnts_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_PHASE_CNTS_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_PHASE_CNTS_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_PHASE_TIME
     case MC1231A_GET_PHASE_TIME_REQUEST_ID:
         return mc1231a_slave_get_phase_time_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_PHASE_TIME_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_PHASE_TIME_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
+#ifndef MC1231A_WITHOUT_GET_PHASE_OFFSET
     case MC1231A_GET_PHASE_OFFSET_REQUEST_ID:
         return mc1231a_slave_get_phase_offset_(slave, frame, wire, capacity);
+#else
+    case MC1231A_GET_PHASE_OFFSET_REQUEST_ID:
+        return mc1231a_reject_(MC1231A_GET_PHASE_OFFSET_RESPONSE_MIN_SIZE, wire, capacity);
+#endif
     default:
         return 0;
     }

@@ -9,10 +9,13 @@
  * C99, C11 and C++17; no library except the headers included below, no allocation, no static data except a CRC
  * table if selected. Functions that write return the number of bytes, or a negative qlink_status_t. Optional
  * macros, to be defined before the include:
- *   QLINK_ENABLE_FLOAT=1  conversions between raw and physical values, in double
- *   QLINK_ENABLE_NAMES=1  names of enum values as text
- *   QLINK_CRC_FORM=FORM   QLINK_CRC_FORM_LOOP (default), _NIBBLE or _TABLE
- *   QLINK_CRC=NAME        another 16-bit algorithm, such as QLINK_CRC_16_XMODEM
+ *   QLINK_ENABLE_FLOAT=1    conversions between raw and physical values
+ *   QLINK_REAL=float        those conversions in float, not in double
+ *   QLINK_ENABLE_NAMES=1    names of enum values as text
+ *   QLINK_CRC_FORM=FORM     QLINK_CRC_FORM_LOOP (default), _NIBBLE or _TABLE
+ *   QLINK_CRC=NAME          another 16-bit algorithm, such as QLINK_CRC_16_XMODEM
+ *   QLINK_CONST_HANDLERS=1  the functions of a slave in a const struct, for flash
+ *   QLINK_WITHOUT_MESSAGE   a slave without the command of this name
  *
  * Example:
  *
@@ -78,6 +81,11 @@ extern "C" {
 #ifndef QLINK_ENABLE_NAMES
 #define QLINK_ENABLE_NAMES 0
 #endif
+
+/* The schema and the generator of this header. */
+#define QLINK_SCHEMA_REVISION "1.0"
+#define QLINK_SCHEMA_HASH 0x00CF6BC2UL
+#define QLINK_GENERATOR_VERSION "0.1.0"
 
 /* Requirements: bytes of eight bits, and two's complement in conversions from unsigned to signed. */
 typedef char qlink_needs_bytes_of_8_bits_[(CHAR_BIT == 8) ? 1 : -1];
@@ -216,27 +224,33 @@ static inline void qlink_copy_(uint8_t *to, const uint8_t *from, size_t count)
 }
 
 #if QLINK_ENABLE_FLOAT
-/* The nearest whole number of steps, ties to even, with the precision of a double. */
-static inline int qlink_nearest_uint8_(double steps, uint8_t least, uint8_t most, uint8_t *raw)
+#ifndef QLINK_REAL
+#define QLINK_REAL double
+#endif
+typedef QLINK_REAL qlink_real_t;
+
+/* The nearest whole number of steps, ties to even, with the precision of the type. */
+static inline int qlink_nearest_uint8_(qlink_real_t steps, uint8_t least, uint8_t most, uint8_t *raw)
 {
     uint8_t whole;
-    double rest;
-    if (!((steps >= ((double)least - 0.5)) && (steps <= ((double)most + 0.5)))) {
+    qlink_real_t rest;
+    if (!((steps >= ((qlink_real_t)least - (qlink_real_t)0.5)) &&
+        (steps <= ((qlink_real_t)most + (qlink_real_t)0.5)))) {
         return QLINK_ERROR_RANGE;
     }
-    if (steps <= (double)least) {
+    if (steps <= (qlink_real_t)least) {
         *raw = least;
         return QLINK_OK;
     }
-    if (steps >= (double)most) {
+    if (steps >= (qlink_real_t)most) {
         *raw = most;
         return QLINK_OK;
     }
     whole = (uint8_t)steps;
-    rest = steps - (double)whole;
-    if ((rest > 0.5) || ((rest == 0.5) && ((whole & 1U) != 0U))) {
+    rest = steps - (qlink_real_t)whole;
+    if ((rest > (qlink_real_t)0.5) || ((rest == (qlink_real_t)0.5) && ((whole & 1U) != 0U))) {
         ++whole;
-    } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1U) != 0U))) {
+    } else if ((rest < (qlink_real_t)-0.5) || ((rest == (qlink_real_t)-0.5) && ((whole & 1U) != 0U))) {
         --whole;
     } else {
         /* already rounded */
@@ -252,16 +266,17 @@ typedef uint8_t qlink_tenths_t;
 #define QLINK_TENTHS_BIAS 0
 #define QLINK_TENTHS_DIVISOR 10
 #if QLINK_ENABLE_FLOAT
-static inline double qlink_tenths_physical(qlink_tenths_t raw)
+static inline qlink_real_t qlink_tenths_physical(qlink_tenths_t raw)
 {
-    const double scaled = ((double)raw * (double)QLINK_TENTHS_FACTOR) + (double)QLINK_TENTHS_BIAS;
-    return scaled / (double)QLINK_TENTHS_DIVISOR;
+    const qlink_real_t scaled = ((qlink_real_t)raw * (qlink_real_t)QLINK_TENTHS_FACTOR) +
+        (qlink_real_t)QLINK_TENTHS_BIAS;
+    return scaled / (qlink_real_t)QLINK_TENTHS_DIVISOR;
 }
 
-static inline int qlink_tenths_raw(double physical, qlink_tenths_t *raw)
+static inline int qlink_tenths_raw(qlink_real_t physical, qlink_tenths_t *raw)
 {
-    const double scaled = (physical * (double)QLINK_TENTHS_DIVISOR) - (double)QLINK_TENTHS_BIAS;
-    const double steps = scaled / (double)QLINK_TENTHS_FACTOR;
+    const qlink_real_t scaled = (physical * (qlink_real_t)QLINK_TENTHS_DIVISOR) - (qlink_real_t)QLINK_TENTHS_BIAS;
+    const qlink_real_t steps = scaled / (qlink_real_t)QLINK_TENTHS_FACTOR;
     return qlink_nearest_uint8_(steps, 0U, 255U, raw);
 }
 #endif
@@ -312,10 +327,12 @@ typedef uint32_t qlink_io24_t;
 #define QLINK_CRC QLINK_CRC_16_IBM_3740
 #endif
 
-/* Expands to 1 for a parenthesised tuple, 0 for an undefined name. */
+/* Expands to 1 for a parenthesised tuple, 0 for an undefined name. The preprocessor that MSVC uses by default passes
+ * __VA_ARGS__ on as one argument, unless the call is itself an argument. */
+#define QLINK_CRC_EXPAND_(call) call
 #define QLINK_CRC_PROBE_(...) 0, 1
 #define QLINK_CRC_PICK_(first, second, ...) second
-#define QLINK_CRC_SECOND_(...) QLINK_CRC_PICK_(__VA_ARGS__)
+#define QLINK_CRC_SECOND_(...) QLINK_CRC_EXPAND_(QLINK_CRC_PICK_(__VA_ARGS__))
 #define QLINK_CRC_KNOWN_(...) QLINK_CRC_SECOND_(__VA_ARGS__, 0, 0)
 #if !QLINK_CRC_KNOWN_(QLINK_CRC_PROBE_ QLINK_CRC)
 #error "QLINK_CRC is neither an algorithm of this header, such as QLINK_CRC_16_IBM_3740, nor a tuple"
@@ -327,7 +344,6 @@ typedef uint32_t qlink_io24_t;
 #define QLINK_CRC_TAKE_2_(poly, start, reflected, xorout) start
 #define QLINK_CRC_TAKE_3_(poly, start, reflected, xorout) reflected
 #define QLINK_CRC_TAKE_4_(poly, start, reflected, xorout) xorout
-#define QLINK_CRC_EXPAND_(call) call
 #define QLINK_CRC_POLY_ QLINK_CRC_EXPAND_(QLINK_CRC_TAKE_1_ QLINK_CRC)
 #define QLINK_CRC_INIT_ QLINK_CRC_EXPAND_(QLINK_CRC_TAKE_2_ QLINK_CRC)
 #define QLINK_CRC_REFLECTED_ QLINK_CRC_EXPAND_(QLINK_CRC_TAKE_3_ QLINK_CRC)
@@ -2223,15 +2239,13 @@ static inline void qlink_receiver_init(qlink_receiver_t *receiver)
 }
 
 /* The frame of the last QLINK_EVENT_FRAME. */
-static inline qlink_frame_t qlink_receiver_frame(const qlink_receiver_t *receiver)
+static inline void qlink_receiver_read(const qlink_receiver_t *receiver, qlink_frame_t *frame)
 {
-    qlink_frame_t frame;
     const uint8_t *const body = receiver->body;
-    frame.id = body[1];
-    frame.node = body[2];
-    frame.size = (size_t)(body[0] - 4U);
-    frame.payload = &body[3];
-    return frame;
+    frame->id = body[1];
+    frame->node = body[2];
+    frame->size = (size_t)(body[0] - 4U);
+    frame->payload = &body[3];
 }
 
 /* Processes the next byte; returns the event that it completed. */
@@ -2294,6 +2308,126 @@ static inline qlink_event_t qlink_receive(qlink_receiver_t *receiver, uint8_t by
 static inline bool qlink_receiver_pending(const qlink_receiver_t *receiver)
 {
     return receiver->state != QLINK_HUNTING_;
+}
+
+#if !defined(__SDCC) && !defined(SDCC) /* functions of SDCC cannot return structs */
+static inline qlink_frame_t qlink_receiver_frame(const qlink_receiver_t *receiver)
+{
+    qlink_frame_t frame;
+    qlink_receiver_read(receiver, &frame);
+    return frame;
+}
+#endif
+
+/* Processes bytes in a row, such as those that DMA has stored, up to the first event; returns their number. Handle the
+ * event, then call it again with the others. */
+static inline size_t qlink_receive_bytes(
+    qlink_receiver_t *receiver, const uint8_t *bytes, size_t size, qlink_event_t *event)
+{
+    size_t taken = 0U;
+    qlink_event_t found = QLINK_EVENT_NONE;
+    while ((found == QLINK_EVENT_NONE) && (taken < size)) {
+        found = qlink_receive(receiver, bytes[taken]);
+        ++taken;
+    }
+    *event = found;
+    return taken;
+}
+
+/* Numbers of events since it was set to zeros: of[QLINK_EVENT_CRC]. */
+typedef struct qlink_event_counts {
+    uint32_t of[9];
+} qlink_event_counts_t;
+
+/* Counts what qlink_receive returned. */
+static inline void qlink_count_event(qlink_event_counts_t *counts, qlink_event_t event)
+{
+    if (event != QLINK_EVENT_NONE) {
+        ++counts->of[event];
+    }
+}
+
+/* ---- Between an interrupt and the main loop ----
+ * Both boxes start as zeros. QLINK_FENCE keeps the compiler from moving accesses across it; on a processor with several
+ * cores define it as a memory barrier. */
+#ifndef QLINK_FENCE
+#if defined(__GNUC__)
+#define QLINK_FENCE() __asm__ volatile("" : : : "memory")
+#else
+#define QLINK_FENCE() ((void)0)
+#endif
+#endif
+
+/* A copy of one frame, which the receiver may no longer have when it is handled. */
+typedef struct qlink_inbox {
+    volatile bool full;
+    qlink_frame_t frame;
+    uint8_t payload[QLINK_MAX_PAYLOAD_SIZE];
+} qlink_inbox_t;
+
+/* In the interrupt: stores a frame; returns false, and drops it, if the one before is still in use. */
+static inline bool qlink_inbox_put(qlink_inbox_t *inbox, const qlink_frame_t *frame)
+{
+    if (inbox->full || (frame->size > sizeof inbox->payload)) {
+        return false;
+    }
+    QLINK_FENCE();
+    inbox->frame = *frame;
+    for (size_t index = 0U; index < frame->size; ++index) {
+        inbox->payload[index] = frame->payload[index];
+    }
+    inbox->frame.payload = inbox->payload;
+    QLINK_FENCE();
+    inbox->full = true;
+    return true;
+}
+
+/* In the main loop: the frame, NULL without one. It is valid until qlink_inbox_clear. */
+static inline const qlink_frame_t *qlink_inbox_frame(const qlink_inbox_t *inbox)
+{
+    const bool full = inbox->full;
+    QLINK_FENCE();
+    return full ? &inbox->frame : NULL;
+}
+
+/* In the main loop: makes room for the next frame. */
+static inline void qlink_inbox_clear(qlink_inbox_t *inbox)
+{
+    QLINK_FENCE();
+    inbox->full = false;
+}
+
+/* A frame that is sent byte by byte: write it to `wire`, then start it. */
+typedef struct qlink_outbox {
+    volatile bool busy; /* until the last byte has been taken; `wire` must not be written */
+    uint8_t size;
+    uint8_t sent;
+    uint8_t wire[QLINK_MAX_WIRE_SIZE];
+} qlink_outbox_t;
+
+/* In the main loop: `size` bytes in `wire` are to be sent; then enable the interrupt of an empty data register. */
+static inline void qlink_outbox_start(qlink_outbox_t *outbox, size_t size)
+{
+    outbox->size = (uint8_t)size;
+    outbox->sent = 0U;
+    QLINK_FENCE();
+    outbox->busy = size > 0U;
+}
+
+/* In the interrupt: takes the next byte; returns false if there is none, so that the interrupt can be disabled. */
+static inline bool qlink_outbox_next(qlink_outbox_t *outbox, uint8_t *byte)
+{
+    if (!outbox->busy) {
+        return false;
+    }
+    QLINK_FENCE();
+    *byte = outbox->wire[outbox->sent];
+    ++outbox->sent;
+    if (outbox->sent >= outbox->size) {
+        QLINK_FENCE();
+        outbox->busy = false;
+    }
+    return true;
 }
 
 /* ---- Transactions ----
@@ -2450,105 +2584,178 @@ static inline bool qlink_receiver_pending(const qlink_receiver_t *receiver)
  * `broadcast` is set; the response has the slave's node as set by the function. */
 typedef struct qlink_slave qlink_slave_t;
 
+#ifndef QLINK_CONST_HANDLERS
+#define QLINK_CONST_HANDLERS 0
+#endif
+#if !QLINK_CONST_HANDLERS
+#define QLINK_HANDLER_(slave, command) ((slave)->command)
+#else
+typedef struct qlink_slave_handlers qlink_slave_handlers_t;
+#if defined(__AVR__)
+#define QLINK_HANDLERS_STORAGE PROGMEM
+#define QLINK_HANDLER_(slave, command) \
+    ((__typeof__((slave)->handlers->command))pgm_read_word(&(slave)->handlers->command))
+#else
+#define QLINK_HANDLERS_STORAGE
+#define QLINK_HANDLER_(slave, command) ((slave)->handlers->command)
+#endif
+#endif
+
 struct qlink_slave {
     uint8_t node;
     bool broadcast;
     void *context; /* for the application */
-    bool (*node_setup)(qlink_slave_t *slave, const qlink_node_setup_request_t *request);
-    bool (*node_info)(qlink_slave_t *slave, qlink_node_info_response_t *response);
-    void (*node_start)(qlink_slave_t *slave);
-    void (*node_stop)(qlink_slave_t *slave);
-    void (*node_sync)(qlink_slave_t *slave, const qlink_node_sync_request_t *request);
-    bool (*node_program_load)(qlink_slave_t *slave, const qlink_node_program_load_request_t *request,
-        qlink_node_program_load_response_t *response);
-    bool (*node_reset)(qlink_slave_t *slave);
-    bool (*motor_response_poll)(qlink_slave_t *slave, qlink_motor_response_poll_response_t *response);
-    bool (*motor_request)(qlink_slave_t *slave, const qlink_motor_request_request_t *request);
-    bool (*motion)(qlink_slave_t *slave, const qlink_motion_request_t *request, qlink_motion_response_t *response);
-    bool (*motor_position)(qlink_slave_t *slave, qlink_motor_position_response_t *response);
-    bool (*clear_fifo)(qlink_slave_t *slave);
-    bool (*preset_motor_position)(qlink_slave_t *slave, const qlink_preset_motor_position_request_t *request);
-    bool (*read)(qlink_slave_t *slave, const qlink_read_request_t *request, qlink_read_response_t *response);
-    bool (*write)(qlink_slave_t *slave, const qlink_write_request_t *request);
-    bool (*write_read)(qlink_slave_t *slave, const qlink_write_read_request_t *request,
-        qlink_write_read_response_t *response);
-    bool (*set_outputs)(qlink_slave_t *slave, const qlink_set_outputs_request_t *request);
-    bool (*clear_outputs)(qlink_slave_t *slave, const qlink_clear_outputs_request_t *request);
-    bool (*loop_back)(qlink_slave_t *slave, const qlink_loop_back_request_t *request,
-        qlink_loop_back_response_t *response);
+#if QLINK_CONST_HANDLERS
+    const struct qlink_slave_handlers *handlers;
 };
 
+/* Define it const, and on AVR with QLINK_HANDLERS_STORAGE, which places it in flash. */
+struct qlink_slave_handlers {
+#endif
+#ifndef QLINK_WITHOUT_NODE_SETUP
+    bool (*node_setup)(qlink_slave_t *slave, const qlink_node_setup_request_t *request);
+#endif
+#ifndef QLINK_WITHOUT_NODE_INFO
+    bool (*node_info)(qlink_slave_t *slave, qlink_node_info_response_t *response);
+#endif
+#ifndef QLINK_WITHOUT_NODE_START
+    void (*node_start)(qlink_slave_t *slave);
+#endif
+#ifndef QLINK_WITHOUT_NODE_STOP
+    void (*node_stop)(qlink_slave_t *slave);
+#endif
+#ifndef QLINK_WITHOUT_NODE_SYNC
+    void (*node_sync)(qlink_slave_t *slave, const qlink_node_sync_request_t *request);
+#endif
+#ifndef QLINK_WITHOUT_NODE_PROGRAM_LOAD
+    bool (*node_program_load)(qlink_slave_t *slave, const qlink_node_program_load_request_t *request,
+        qlink_node_program_load_response_t *response);
+#endif
+#ifndef QLINK_WITHOUT_NODE_RESET
+    bool (*node_reset)(qlink_slave_t *slave);
+#endif
+#ifndef QLINK_WITHOUT_MOTOR_RESPONSE_POLL
+    bool (*motor_response_poll)(qlink_slave_t *slave, qlink_motor_response_poll_response_t *response);
+#endif
+#ifndef QLINK_WITHOUT_MOTOR_REQUEST
+    bool (*motor_request)(qlink_slave_t *slave, const qlink_motor_request_request_t *request);
+#endif
+#ifndef QLINK_WITHOUT_MOTION
+    bool (*motion)(qlink_slave_t *slave, const qlink_motion_request_t *request, qlink_motion_response_t *response);
+#endif
+#ifndef QLINK_WITHOUT_MOTOR_POSITION
+    bool (*motor_position)(qlink_slave_t *slave, qlink_motor_position_response_t *response);
+#endif
+#ifndef QLINK_WITHOUT_CLEAR_FIFO
+    bool (*clear_fifo)(qlink_slave_t *slave);
+#endif
+#ifndef QLINK_WITHOUT_PRESET_MOTOR_POSITION
+    bool (*preset_motor_position)(qlink_slave_t *slave, const qlink_preset_motor_position_request_t *request);
+#endif
+#ifndef QLINK_WITHOUT_READ
+    bool (*read)(qlink_slave_t *slave, const qlink_read_request_t *request, qlink_read_response_t *response);
+#endif
+#ifndef QLINK_WITHOUT_WRITE
+    bool (*write)(qlink_slave_t *slave, const qlink_write_request_t *request);
+#endif
+#ifndef QLINK_WITHOUT_WRITE_READ
+    bool (*write_read)(qlink_slave_t *slave, const qlink_write_read_request_t *request,
+        qlink_write_read_response_t *response);
+#endif
+#ifndef QLINK_WITHOUT_SET_OUTPUTS
+    bool (*set_outputs)(qlink_slave_t *slave, const qlink_set_outputs_request_t *request);
+#endif
+#ifndef QLINK_WITHOUT_CLEAR_OUTPUTS
+    bool (*clear_outputs)(qlink_slave_t *slave, const qlink_clear_outputs_request_t *request);
+#endif
+#ifndef QLINK_WITHOUT_LOOP_BACK
+    bool (*loop_back)(qlink_slave_t *slave, const qlink_loop_back_request_t *request,
+        qlink_loop_back_response_t *response);
+#endif
+};
+
+#ifndef QLINK_WITHOUT_NODE_SETUP
 static inline int qlink_slave_node_setup_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_node_setup_request_t request;
     int size = 0;
 
-    if (slave->node_setup == NULL) {
+    if (QLINK_HANDLER_(slave, node_setup) == NULL) {
         return 0;
     }
     if (qlink_node_setup_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = (slave->node_setup)(slave, &request);
+        const bool answers = QLINK_HANDLER_(slave, node_setup)(slave, &request);
         if (answers) {
             size = qlink_node_setup_response_to_frame(slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_NODE_INFO
 static inline int qlink_slave_node_info_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_node_info_response_t response = QLINK_NODE_INFO_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->node_info == NULL) {
+    if (QLINK_HANDLER_(slave, node_info) == NULL) {
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->node_info)(slave, &response);
+        const bool answers = QLINK_HANDLER_(slave, node_info)(slave, &response);
         if (answers) {
             size = qlink_node_info_response_to_frame(&response, slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_NODE_START
 static inline int qlink_slave_node_start_(qlink_slave_t *slave, const qlink_frame_t *frame)
 {
-    if (slave->node_start == NULL) {
+    if (QLINK_HANDLER_(slave, node_start) == NULL) {
         return 0;
     }
     if (frame->size == 0U) {
-        (slave->node_start)(slave);
+        QLINK_HANDLER_(slave, node_start)(slave);
     }
     return 0;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_NODE_STOP
 static inline int qlink_slave_node_stop_(qlink_slave_t *slave, const qlink_frame_t *frame)
 {
-    if (slave->node_stop == NULL) {
+    if (QLINK_HANDLER_(slave, node_stop) == NULL) {
         return 0;
     }
     if (frame->size == 0U) {
-        (slave->node_stop)(slave);
+        QLINK_HANDLER_(slave, node_stop)(slave);
     }
     return 0;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_NODE_SYNC
 static inline int qlink_slave_node_sync_(qlink_slave_t *slave, const qlink_frame_t *frame)
 {
     qlink_node_sync_request_t request;
 
-    if (slave->node_sync == NULL) {
+    if (QLINK_HANDLER_(slave, node_sync) == NULL) {
         return 0;
     }
     if (qlink_node_sync_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        (slave->node_sync)(slave, &request);
+        QLINK_HANDLER_(slave, node_sync)(slave, &request);
     }
     return 0;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_NODE_PROGRAM_LOAD
 static inline int qlink_slave_node_program_load_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
@@ -2556,179 +2763,199 @@ static inline int qlink_slave_node_program_load_(
     qlink_node_program_load_response_t response = QLINK_NODE_PROGRAM_LOAD_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->node_program_load == NULL) {
+    if (QLINK_HANDLER_(slave, node_program_load) == NULL) {
         return 0;
     }
     if (qlink_node_program_load_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
         response.counter = request.counter;
-        const bool answers = (slave->node_program_load)(slave, &request, &response);
+        const bool answers = QLINK_HANDLER_(slave, node_program_load)(slave, &request, &response);
         if (answers) {
             size = qlink_node_program_load_response_to_frame(&response, slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_NODE_RESET
 static inline int qlink_slave_node_reset_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->node_reset == NULL) {
+    if (QLINK_HANDLER_(slave, node_reset) == NULL) {
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->node_reset)(slave);
+        const bool answers = QLINK_HANDLER_(slave, node_reset)(slave);
         if (answers) {
             size = qlink_node_reset_response_to_frame(slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_MOTOR_RESPONSE_POLL
 static inline int qlink_slave_motor_response_poll_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_motor_response_poll_response_t response = QLINK_MOTOR_RESPONSE_POLL_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->motor_response_poll == NULL) {
+    if (QLINK_HANDLER_(slave, motor_response_poll) == NULL) {
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->motor_response_poll)(slave, &response);
+        const bool answers = QLINK_HANDLER_(slave, motor_response_poll)(slave, &response);
         if (answers) {
             size = qlink_motor_response_poll_response_to_frame(&response, slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_MOTOR_REQUEST
 static inline int qlink_slave_motor_request_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_motor_request_request_t request;
     int size = 0;
 
-    if (slave->motor_request == NULL) {
+    if (QLINK_HANDLER_(slave, motor_request) == NULL) {
         return 0;
     }
     if (qlink_motor_request_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = (slave->motor_request)(slave, &request);
+        const bool answers = QLINK_HANDLER_(slave, motor_request)(slave, &request);
         if (answers) {
             size = qlink_motor_request_response_to_frame(slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_MOTION
 static inline int qlink_slave_motion_(qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_motion_request_t request;
     qlink_motion_response_t response = QLINK_MOTION_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->motion == NULL) {
+    if (QLINK_HANDLER_(slave, motion) == NULL) {
         return 0;
     }
     if (qlink_motion_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
         response.counter = request.counter;
-        const bool answers = (slave->motion)(slave, &request, &response);
+        const bool answers = QLINK_HANDLER_(slave, motion)(slave, &request, &response);
         if (answers) {
             size = qlink_motion_response_to_frame(&response, slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_MOTOR_POSITION
 static inline int qlink_slave_motor_position_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_motor_position_response_t response = QLINK_MOTOR_POSITION_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->motor_position == NULL) {
+    if (QLINK_HANDLER_(slave, motor_position) == NULL) {
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->motor_position)(slave, &response);
+        const bool answers = QLINK_HANDLER_(slave, motor_position)(slave, &response);
         if (answers) {
             size = qlink_motor_position_response_to_frame(&response, slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_CLEAR_FIFO
 static inline int qlink_slave_clear_fifo_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     int size = 0;
 
-    if (slave->clear_fifo == NULL) {
+    if (QLINK_HANDLER_(slave, clear_fifo) == NULL) {
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = (slave->clear_fifo)(slave);
+        const bool answers = QLINK_HANDLER_(slave, clear_fifo)(slave);
         if (answers) {
             size = qlink_clear_fifo_response_to_frame(slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_PRESET_MOTOR_POSITION
 static inline int qlink_slave_preset_motor_position_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_preset_motor_position_request_t request;
     int size = 0;
 
-    if (slave->preset_motor_position == NULL) {
+    if (QLINK_HANDLER_(slave, preset_motor_position) == NULL) {
         return 0;
     }
     if (qlink_preset_motor_position_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = (slave->preset_motor_position)(slave, &request);
+        const bool answers = QLINK_HANDLER_(slave, preset_motor_position)(slave, &request);
         if (answers) {
             size = qlink_preset_motor_position_response_to_frame(slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_READ
 static inline int qlink_slave_read_(qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_read_request_t request;
     qlink_read_response_t response = QLINK_READ_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->read == NULL) {
+    if (QLINK_HANDLER_(slave, read) == NULL) {
         return 0;
     }
     if (qlink_read_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = (slave->read)(slave, &request, &response);
+        const bool answers = QLINK_HANDLER_(slave, read)(slave, &request, &response);
         if (answers) {
             size = qlink_read_response_to_frame(&response, slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_WRITE
 static inline int qlink_slave_write_(qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_write_request_t request;
     int size = 0;
 
-    if (slave->write == NULL) {
+    if (QLINK_HANDLER_(slave, write) == NULL) {
         return 0;
     }
     if (qlink_write_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = (slave->write)(slave, &request);
+        const bool answers = QLINK_HANDLER_(slave, write)(slave, &request);
         if (answers) {
             size = qlink_write_response_to_frame(slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_WRITE_READ
 static inline int qlink_slave_write_read_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
@@ -2736,54 +2963,60 @@ static inline int qlink_slave_write_read_(
     qlink_write_read_response_t response = QLINK_WRITE_READ_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->write_read == NULL) {
+    if (QLINK_HANDLER_(slave, write_read) == NULL) {
         return 0;
     }
     if (qlink_write_read_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = (slave->write_read)(slave, &request, &response);
+        const bool answers = QLINK_HANDLER_(slave, write_read)(slave, &request, &response);
         if (answers) {
             size = qlink_write_read_response_to_frame(&response, slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_SET_OUTPUTS
 static inline int qlink_slave_set_outputs_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_set_outputs_request_t request;
     int size = 0;
 
-    if (slave->set_outputs == NULL) {
+    if (QLINK_HANDLER_(slave, set_outputs) == NULL) {
         return 0;
     }
     if (qlink_set_outputs_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = (slave->set_outputs)(slave, &request);
+        const bool answers = QLINK_HANDLER_(slave, set_outputs)(slave, &request);
         if (answers) {
             size = qlink_set_outputs_response_to_frame(slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_CLEAR_OUTPUTS
 static inline int qlink_slave_clear_outputs_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_clear_outputs_request_t request;
     int size = 0;
 
-    if (slave->clear_outputs == NULL) {
+    if (QLINK_HANDLER_(slave, clear_outputs) == NULL) {
         return 0;
     }
     if (qlink_clear_outputs_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = (slave->clear_outputs)(slave, &request);
+        const bool answers = QLINK_HANDLER_(slave, clear_outputs)(slave, &request);
         if (answers) {
             size = qlink_clear_outputs_response_to_frame(slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
+#ifndef QLINK_WITHOUT_LOOP_BACK
 static inline int qlink_slave_loop_back_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
@@ -2791,7 +3024,7 @@ static inline int qlink_slave_loop_back_(
     qlink_loop_back_response_t response = QLINK_LOOP_BACK_RESPONSE_INIT;
     int size = 0;
 
-    if (slave->loop_back == NULL) {
+    if (QLINK_HANDLER_(slave, loop_back) == NULL) {
         return 0;
     }
     if (qlink_loop_back_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
@@ -2800,46 +3033,78 @@ static inline int qlink_slave_loop_back_(
         for (size_t index = 0U; index < request.data_size; ++index) {
             response.data[index] = request.data[index];
         }
-        const bool answers = (slave->loop_back)(slave, &request, &response);
+        const bool answers = QLINK_HANDLER_(slave, loop_back)(slave, &request, &response);
         if (answers) {
             size = qlink_loop_back_response_to_frame(&response, slave->node, wire, capacity);
         }
     }
     return size;
 }
+#endif
 
 /* Requests to one node. */
 static inline int qlink_handle_own_(qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
+    (void)slave; /* unused if all commands are left out */
+    (void)wire;
+    (void)capacity;
     switch (frame->id) {
+#ifndef QLINK_WITHOUT_NODE_PROGRAM_LOAD
     case QLINK_NODE_PROGRAM_LOAD_REQUEST_ID:
         return qlink_slave_node_program_load_(slave, frame, wire, capacity);
+#endif
+#ifndef QLINK_WITHOUT_NODE_RESET
     case QLINK_NODE_RESET_REQUEST_ID:
         return qlink_slave_node_reset_(slave, frame, wire, capacity);
+#endif
+#ifndef QLINK_WITHOUT_MOTOR_RESPONSE_POLL
     case QLINK_MOTOR_RESPONSE_POLL_REQUEST_ID:
         return qlink_slave_motor_response_poll_(slave, frame, wire, capacity);
+#endif
+#ifndef QLINK_WITHOUT_MOTOR_REQUEST
     case QLINK_MOTOR_REQUEST_REQUEST_ID:
         return qlink_slave_motor_request_(slave, frame, wire, capacity);
+#endif
+#ifndef QLINK_WITHOUT_MOTION
     case QLINK_MOTION_REQUEST_ID:
         return qlink_slave_motion_(slave, frame, wire, capacity);
+#endif
+#ifndef QLINK_WITHOUT_MOTOR_POSITION
     case QLINK_MOTOR_POSITION_REQUEST_ID:
         return qlink_slave_motor_position_(slave, frame, wire, capacity);
+#endif
+#ifndef QLINK_WITHOUT_CLEAR_FIFO
     case QLINK_CLEAR_FIFO_REQUEST_ID:
         return qlink_slave_clear_fifo_(slave, frame, wire, capacity);
+#endif
+#ifndef QLINK_WITHOUT_PRESET_MOTOR_POSITION
     case QLINK_PRESET_MOTOR_POSITION_REQUEST_ID:
         return qlink_slave_preset_motor_position_(slave, frame, wire, capacity);
+#endif
+#ifndef QLINK_WITHOUT_READ
     case QLINK_READ_REQUEST_ID:
         return qlink_slave_read_(slave, frame, wire, capacity);
+#endif
+#ifndef QLINK_WITHOUT_WRITE
     case QLINK_WRITE_REQUEST_ID:
         return qlink_slave_write_(slave, frame, wire, capacity);
+#endif
+#ifndef QLINK_WITHOUT_WRITE_READ
     case QLINK_WRITE_READ_REQUEST_ID:
         return qlink_slave_write_read_(slave, frame, wire, capacity);
+#endif
+#ifndef QLINK_WITHOUT_SET_OUTPUTS
     case QLINK_SET_OUTPUTS_REQUEST_ID:
         return qlink_slave_set_outputs_(slave, frame, wire, capacity);
+#endif
+#ifndef QLINK_WITHOUT_CLEAR_OUTPUTS
     case QLINK_CLEAR_OUTPUTS_REQUEST_ID:
         return qlink_slave_clear_outputs_(slave, frame, wire, capacity);
+#endif
+#ifndef QLINK_WITHOUT_LOOP_BACK
     case QLINK_LOOP_BACK_REQUEST_ID:
         return qlink_slave_loop_back_(slave, frame, wire, capacity);
+#endif
     default:
         return 0;
     }
@@ -2848,17 +3113,45 @@ static inline int qlink_handle_own_(qlink_slave_t *slave, const qlink_frame_t *f
 /* Requests that may be broadcast; the others must not be. */
 static inline int qlink_handle_any_(qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
+    (void)slave; /* unused if all commands are left out */
+    (void)wire;
+    (void)capacity;
     switch (frame->id) {
+#ifndef QLINK_WITHOUT_NODE_SETUP
     case QLINK_NODE_SETUP_REQUEST_ID:
         return qlink_slave_node_setup_(slave, frame, wire, capacity);
+#else
+    case QLINK_NODE_SETUP_REQUEST_ID:
+        return 0;
+#endif
+#ifndef QLINK_WITHOUT_NODE_INFO
     case QLINK_NODE_INFO_REQUEST_ID:
         return qlink_slave_node_info_(slave, frame, wire, capacity);
+#else
+    case QLINK_NODE_INFO_REQUEST_ID:
+        return 0;
+#endif
+#ifndef QLINK_WITHOUT_NODE_START
     case QLINK_NODE_START_REQUEST_ID:
         return qlink_slave_node_start_(slave, frame);
+#else
+    case QLINK_NODE_START_REQUEST_ID:
+        return 0;
+#endif
+#ifndef QLINK_WITHOUT_NODE_STOP
     case QLINK_NODE_STOP_REQUEST_ID:
         return qlink_slave_node_stop_(slave, frame);
+#else
+    case QLINK_NODE_STOP_REQUEST_ID:
+        return 0;
+#endif
+#ifndef QLINK_WITHOUT_NODE_SYNC
     case QLINK_NODE_SYNC_REQUEST_ID:
         return slave->broadcast ? qlink_slave_node_sync_(slave, frame) : 0;
+#else
+    case QLINK_NODE_SYNC_REQUEST_ID:
+        return 0;
+#endif
     default:
         return slave->broadcast ? 0 : qlink_handle_own_(slave, frame, wire, capacity);
     }

@@ -10,7 +10,8 @@
  * C99, C11 and C++17; no library except the headers included below, no allocation, no static data except a CRC
  * table if selected. Functions that write return the number of bytes, or a negative trio_status_t. Optional
  * macros, to be defined before the include:
- *   TRIO_ENABLE_FLOAT=1  conversions between raw and physical values, in double
+ *   TRIO_ENABLE_FLOAT=1  conversions between raw and physical values
+ *   TRIO_REAL=float      those conversions in float, not in double
  *   TRIO_ENABLE_NAMES=1  names of enum values as text
  *   TRIO_CRC_FORM=FORM   TRIO_CRC_FORM_LOOP (default), _NIBBLE or _TABLE
  *   TRIO_CRC=NAME        another 16-bit algorithm, such as TRIO_CRC_16_XMODEM
@@ -64,6 +65,11 @@ extern "C" {
 #ifndef TRIO_ENABLE_NAMES
 #define TRIO_ENABLE_NAMES 0
 #endif
+
+/* The schema and the generator of this header. */
+#define TRIO_SCHEMA_REVISION "1"
+#define TRIO_SCHEMA_HASH 0x44EC8B05UL
+#define TRIO_GENERATOR_VERSION "0.1.0"
 
 /* Requirements: bytes of eight bits, and two's complement in conversions from unsigned to signed. */
 typedef char trio_needs_bytes_of_8_bits_[(CHAR_BIT == 8) ? 1 : -1];
@@ -207,27 +213,32 @@ static inline bool trio_is_text_(const uint8_t *bytes, size_t size)
 }
 
 #if TRIO_ENABLE_FLOAT
-/* The nearest whole number of steps, ties to even, with the precision of a double. */
-static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most, int64_t *raw)
+#ifndef TRIO_REAL
+#define TRIO_REAL double
+#endif
+typedef TRIO_REAL trio_real_t;
+
+/* The nearest whole number of steps, ties to even, with the precision of the type. */
+static inline int trio_nearest_int64_(trio_real_t steps, int64_t least, int64_t most, int64_t *raw)
 {
     int64_t whole;
-    double rest;
-    if (!((steps >= ((double)least - 0.5)) && (steps <= ((double)most + 0.5)))) {
+    trio_real_t rest;
+    if (!((steps >= ((trio_real_t)least - (trio_real_t)0.5)) && (steps <= ((trio_real_t)most + (trio_real_t)0.5)))) {
         return TRIO_ERROR_RANGE;
     }
-    if (steps <= (double)least) {
+    if (steps <= (trio_real_t)least) {
         *raw = least;
         return TRIO_OK;
     }
-    if (steps >= (double)most) {
+    if (steps >= (trio_real_t)most) {
         *raw = most;
         return TRIO_OK;
     }
     whole = (int64_t)steps;
-    rest = steps - (double)whole;
-    if ((rest > 0.5) || ((rest == 0.5) && ((whole & 1) != 0))) {
+    rest = steps - (trio_real_t)whole;
+    if ((rest > (trio_real_t)0.5) || ((rest == (trio_real_t)0.5) && ((whole & 1) != 0))) {
         ++whole;
-    } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1) != 0))) {
+    } else if ((rest < (trio_real_t)-0.5) || ((rest == (trio_real_t)-0.5) && ((whole & 1) != 0))) {
         --whole;
     } else {
         /* already rounded */
@@ -277,10 +288,12 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
 #define TRIO_CRC TRIO_CRC_16_IBM_3740
 #endif
 
-/* Expands to 1 for a parenthesised tuple, 0 for an undefined name. */
+/* Expands to 1 for a parenthesised tuple, 0 for an undefined name. The preprocessor that MSVC uses by default passes
+ * __VA_ARGS__ on as one argument, unless the call is itself an argument. */
+#define TRIO_CRC_EXPAND_(call) call
 #define TRIO_CRC_PROBE_(...) 0, 1
 #define TRIO_CRC_PICK_(first, second, ...) second
-#define TRIO_CRC_SECOND_(...) TRIO_CRC_PICK_(__VA_ARGS__)
+#define TRIO_CRC_SECOND_(...) TRIO_CRC_EXPAND_(TRIO_CRC_PICK_(__VA_ARGS__))
 #define TRIO_CRC_KNOWN_(...) TRIO_CRC_SECOND_(__VA_ARGS__, 0, 0)
 #if !TRIO_CRC_KNOWN_(TRIO_CRC_PROBE_ TRIO_CRC)
 #error "TRIO_CRC is neither an algorithm of this header, such as TRIO_CRC_16_IBM_3740, nor a tuple"
@@ -292,7 +305,6 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
 #define TRIO_CRC_TAKE_2_(poly, start, reflected, xorout) start
 #define TRIO_CRC_TAKE_3_(poly, start, reflected, xorout) reflected
 #define TRIO_CRC_TAKE_4_(poly, start, reflected, xorout) xorout
-#define TRIO_CRC_EXPAND_(call) call
 #define TRIO_CRC_POLY_ TRIO_CRC_EXPAND_(TRIO_CRC_TAKE_1_ TRIO_CRC)
 #define TRIO_CRC_INIT_ TRIO_CRC_EXPAND_(TRIO_CRC_TAKE_2_ TRIO_CRC)
 #define TRIO_CRC_REFLECTED_ TRIO_CRC_EXPAND_(TRIO_CRC_TAKE_3_ TRIO_CRC)
@@ -690,18 +702,18 @@ static inline int trio_character_transfer_to_frame(
 #define TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_BIAS 0
 #define TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR 4294967296LL
 #if TRIO_ENABLE_FLOAT
-static inline double trio_direct_variable_transfer_value_physical(int64_t raw)
+static inline trio_real_t trio_direct_variable_transfer_value_physical(int64_t raw)
 {
-    const double scaled = ((double)raw * (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_FACTOR) +
-        (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_BIAS;
-    return scaled / (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR;
+    const trio_real_t scaled = ((trio_real_t)raw * (trio_real_t)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_FACTOR) +
+        (trio_real_t)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_BIAS;
+    return scaled / (trio_real_t)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR;
 }
 
-static inline int trio_direct_variable_transfer_value_raw(double physical, int64_t *raw)
+static inline int trio_direct_variable_transfer_value_raw(trio_real_t physical, int64_t *raw)
 {
-    const double scaled = (physical * (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR) -
-        (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_BIAS;
-    const double steps = scaled / (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_FACTOR;
+    const trio_real_t scaled = (physical * (trio_real_t)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR) -
+        (trio_real_t)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_BIAS;
+    const trio_real_t steps = scaled / (trio_real_t)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_FACTOR;
     return trio_nearest_int64_(steps, INT64_MIN, 9223372036854775807LL, raw);
 }
 #endif
@@ -927,15 +939,13 @@ static inline void trio_receiver_init(trio_receiver_t *receiver)
 }
 
 /* The frame of the last TRIO_EVENT_FRAME. */
-static inline trio_frame_t trio_receiver_frame(const trio_receiver_t *receiver)
+static inline void trio_receiver_read(const trio_receiver_t *receiver, trio_frame_t *frame)
 {
-    trio_frame_t frame;
     const uint8_t byte = receiver->header;
-    frame.id = (uint8_t)(byte & 0x07U);
-    frame.address = (uint8_t)(((unsigned)byte >> 3) & 0x0FU);
-    frame.size = receiver->count;
-    frame.payload = receiver->buffer;
-    return frame;
+    frame->id = (uint8_t)(byte & 0x07U);
+    frame->address = (uint8_t)(((unsigned)byte >> 3) & 0x0FU);
+    frame->size = receiver->count;
+    frame->payload = receiver->buffer;
 }
 
 static inline trio_event_t trio_receiver_end_(trio_receiver_t *receiver, uint8_t end_byte)
@@ -996,6 +1006,126 @@ static inline trio_event_t trio_receive(trio_receiver_t *receiver, uint8_t byte)
     }
     ++receiver->count;
     return TRIO_EVENT_NONE;
+}
+
+#if !defined(__SDCC) && !defined(SDCC) /* functions of SDCC cannot return structs */
+static inline trio_frame_t trio_receiver_frame(const trio_receiver_t *receiver)
+{
+    trio_frame_t frame;
+    trio_receiver_read(receiver, &frame);
+    return frame;
+}
+#endif
+
+/* Processes bytes in a row, such as those that DMA has stored, up to the first event; returns their number. Handle the
+ * event, then call it again with the others. */
+static inline size_t trio_receive_bytes(
+    trio_receiver_t *receiver, const uint8_t *bytes, size_t size, trio_event_t *event)
+{
+    size_t taken = 0U;
+    trio_event_t found = TRIO_EVENT_NONE;
+    while ((found == TRIO_EVENT_NONE) && (taken < size)) {
+        found = trio_receive(receiver, bytes[taken]);
+        ++taken;
+    }
+    *event = found;
+    return taken;
+}
+
+/* Numbers of events since it was set to zeros: of[TRIO_EVENT_CRC]. */
+typedef struct trio_event_counts {
+    uint32_t of[9];
+} trio_event_counts_t;
+
+/* Counts what trio_receive returned. */
+static inline void trio_count_event(trio_event_counts_t *counts, trio_event_t event)
+{
+    if (event != TRIO_EVENT_NONE) {
+        ++counts->of[event];
+    }
+}
+
+/* ---- Between an interrupt and the main loop ----
+ * Both boxes start as zeros. TRIO_FENCE keeps the compiler from moving accesses across it; on a processor with several
+ * cores define it as a memory barrier. */
+#ifndef TRIO_FENCE
+#if defined(__GNUC__)
+#define TRIO_FENCE() __asm__ volatile("" : : : "memory")
+#else
+#define TRIO_FENCE() ((void)0)
+#endif
+#endif
+
+/* A copy of one frame, which the receiver may no longer have when it is handled. */
+typedef struct trio_inbox {
+    volatile bool full;
+    trio_frame_t frame;
+    uint8_t payload[TRIO_MAX_PAYLOAD_SIZE];
+} trio_inbox_t;
+
+/* In the interrupt: stores a frame; returns false, and drops it, if the one before is still in use. */
+static inline bool trio_inbox_put(trio_inbox_t *inbox, const trio_frame_t *frame)
+{
+    if (inbox->full || (frame->size > sizeof inbox->payload)) {
+        return false;
+    }
+    TRIO_FENCE();
+    inbox->frame = *frame;
+    for (size_t index = 0U; index < frame->size; ++index) {
+        inbox->payload[index] = frame->payload[index];
+    }
+    inbox->frame.payload = inbox->payload;
+    TRIO_FENCE();
+    inbox->full = true;
+    return true;
+}
+
+/* In the main loop: the frame, NULL without one. It is valid until trio_inbox_clear. */
+static inline const trio_frame_t *trio_inbox_frame(const trio_inbox_t *inbox)
+{
+    const bool full = inbox->full;
+    TRIO_FENCE();
+    return full ? &inbox->frame : NULL;
+}
+
+/* In the main loop: makes room for the next frame. */
+static inline void trio_inbox_clear(trio_inbox_t *inbox)
+{
+    TRIO_FENCE();
+    inbox->full = false;
+}
+
+/* A frame that is sent byte by byte: write it to `wire`, then start it. */
+typedef struct trio_outbox {
+    volatile bool busy; /* until the last byte has been taken; `wire` must not be written */
+    uint16_t size;
+    uint16_t sent;
+    uint8_t wire[TRIO_MAX_WIRE_SIZE];
+} trio_outbox_t;
+
+/* In the main loop: `size` bytes in `wire` are to be sent; then enable the interrupt of an empty data register. */
+static inline void trio_outbox_start(trio_outbox_t *outbox, size_t size)
+{
+    outbox->size = (uint16_t)size;
+    outbox->sent = 0U;
+    TRIO_FENCE();
+    outbox->busy = size > 0U;
+}
+
+/* In the interrupt: takes the next byte; returns false if there is none, so that the interrupt can be disabled. */
+static inline bool trio_outbox_next(trio_outbox_t *outbox, uint8_t *byte)
+{
+    if (!outbox->busy) {
+        return false;
+    }
+    TRIO_FENCE();
+    *byte = outbox->wire[outbox->sent];
+    ++outbox->sent;
+    if (outbox->sent >= outbox->size) {
+        TRIO_FENCE();
+        outbox->busy = false;
+    }
+    return true;
 }
 
 /* ---- Listener ----

@@ -133,9 +133,10 @@ _C_HANDLERS = frozenset(
 #: Names that the header itself defines, or their beginnings, without the prefix of the protocol.
 _C_STEMS = frozenset(
     """addressing async_master_calls async_node_calls bits bits_per bus check codec_error command crc
-    decode decode_buffer decode_error direction enable encode_error encode error event fault first
-    frame last listener master master_calls max max_frame max_payload max_wire message node_calls ok
-    parts receiver repeat repeat_by request response slave slave_handlers status stream_decoder""".split()  # noqa: SIM905
+    decode decode_buffer decode_error direction enable encode_error encode error event event_counts
+    fault first frame generator inbox last listener master master_calls max max_frame max_payload
+    max_wire message node_calls ok outbox parts protocol real receiver repeat repeat_by request
+    response schema slave slave_handlers status stream_decoder without""".split()  # noqa: SIM905
 )
 #: Types of the C library that may equal a name with the prefix of a protocol.
 _C_TYPES = frozenset(

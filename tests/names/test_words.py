@@ -93,9 +93,14 @@ def types_of(known: Sequence[str]) -> list[str]:
 
 
 def dealt(known: Sequence[str], size: int) -> list[Sequence[str]]:
-    """The words in groups of at most so many; words with the same beginning are in different groups."""
-    groups = -(-len(known) // size)
-    return [known[index::groups] for index in range(groups)]
+    """The words in groups of at most so many; no group has a word and the name of its size or count."""
+    for groups in range(-(-len(known) // size), len(known) + 1):
+        found = [known[index::groups] for index in range(groups)]
+        if not any(
+            f"{word}{end}" in group for group in found for word in group for end in ("_size", "_count")
+        ):
+            return found
+    raise AssertionError("one group each has no clash")
 
 
 def runs(names: Sequence[str]) -> Mapping[str, Json]:

@@ -40,6 +40,7 @@ class SlaveEntry:
     Attributes:
         own: it must not be broadcast.
         unsupported: the result if the slave has no function for it.
+        without: the macro that leaves it out.
         right: condition for a valid payload.
         unless_silent: term of a condition that prevents a response to a broadcast.
         replies: functions of other answers.
@@ -62,6 +63,7 @@ class SlaveEntry:
     own: bool
     broadcast_only: bool
     unsupported: str
+    without: str
     right: str
     unless_silent: str
     replies: list[str]
@@ -73,6 +75,11 @@ class SlaveEntry:
     listed: Listed | None
     begins: str
     stops: list[str]
+
+    @property
+    def absent(self) -> str:
+        """The result if it is left out: a later frame of a dialogue is due only after others."""
+        return "0" if self.turn else self.unsupported
 
 
 class Streaming(NamedTuple):
@@ -272,6 +279,7 @@ def _entry(
         own=addressing in {"node", "none"},
         broadcast_only=addressing == "broadcast",
         unsupported=f"{reject}({answer_constant}_MIN_SIZE, wire, capacity)" if refuses else "0",
+        without=f"{names.upper}_WITHOUT_{handler_name(names, message).rstrip('_').upper()}",
         right=" && ".join(f"({each})" for each in right) if len(right) > 1 else right[0],
         unless_silent=" && !slave->broadcast" if answer and addressing == "either" else "",
         replies=replies,

@@ -21,16 +21,20 @@ if TYPE_CHECKING:
 _BREAK = "\n *     "
 
 
-def option_lines(upper: str, check: CheckView | None) -> list[str]:
+def option_lines(upper: str, check: CheckView | None, *, slave: bool) -> list[str]:
     """Macros that users may define."""
     options = [
-        (f"{upper}_ENABLE_FLOAT=1", "conversions between raw and physical values, in double"),
+        (f"{upper}_ENABLE_FLOAT=1", "conversions between raw and physical values"),
+        (f"{upper}_REAL=float", "those conversions in float, not in double"),
         (f"{upper}_ENABLE_NAMES=1", "names of enum values as text"),
     ]
     if isinstance(check, CrcView):
         options.append((f"{upper}_CRC_FORM=FORM", f"{upper}_CRC_FORM_LOOP (default), _NIBBLE or _TABLE"))
     if isinstance(check, CrcView) and check.selectable:
         options.append((f"{upper}_CRC=NAME", f"another 16-bit algorithm, such as {upper}_CRC_16_XMODEM"))
+    if slave:
+        options.append((f"{upper}_CONST_HANDLERS=1", "the functions of a slave in a const struct, for flash"))
+        options.append((f"{upper}_WITHOUT_MESSAGE", "a slave without the command of this name"))
     width = max(len(name) for name, _ in options)
     return [f"{name:<{width}}  {what}" for name, what in options]
 

@@ -12,6 +12,7 @@ import jinja2
 from qlinkgen.backends import c_text
 from qlinkgen.backends.base import banner
 from qlinkgen.backends.c import dispatch, framing
+from qlinkgen.backends.c.boxes import boxes
 from qlinkgen.backends.c.constants import EnumView, enum_views, limits
 from qlinkgen.backends.c.counter import counter
 from qlinkgen.backends.c.crc import CrcView, render_of_fields
@@ -27,6 +28,7 @@ from qlinkgen.backends.c.places import in_hex
 from qlinkgen.backends.c.proofs import proof_views
 from qlinkgen.backends.c.several import several
 from qlinkgen.backends.c.sizes import SizeView, size_view, sized_by_message, turn_view
+from qlinkgen.backends.c.stamp import stamps
 from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.backends.c.types import Kind, Types
 from qlinkgen.backends.c.views import FrameView, own_prefix
@@ -51,12 +53,13 @@ class HeadView:
     options: list[str]
     example: list[str]
     max_wire_size: int
+    stamps: list[tuple[str, str]]
     limits: list[tuple[str, str]]
     enums: list[EnumView]
     helpers: list[Helper]
     has_text: bool
     has_bytes: bool
-    has_table: bool
+    in_flash: bool
     extended: list[int]
     nearest: list[Rounding]
     floats: list[str]
@@ -281,6 +284,8 @@ class Header:
             return []
         section = self._section
         found = [self._frame_part(section.receiver, section.view, section.views)]
+        box = boxes(self._plan, self._names.upper)
+        found.append(self._place("boxes", b=box, rescans=section.rescans))
         turn = turn_view(self._plan, self._names, self._layouts)
         return found + ([self._place("turn", f=section.view, turn=turn)] if turn else [])
 
@@ -293,7 +298,7 @@ class Header:
         section, commands, role = self._section, self._plan.commands, self._plan.role
         ring = self._protocol.directions == ("message",)
         listens = (role != "slave" or ring) and not section.slave_only
-        slave = [] if ring or role == "master" else self._slave()
+        slave = self._slave() if self._has_slave else []
         answered = next((c for c in commands if c.response is not None), None)
         return self._place(
             "dispatch",
@@ -362,20 +367,32 @@ class Header:
         return HeadView(
             banner=[piece for line in banner(protocol) for piece in c_text.comment(line, WIDTH)],
             about=c_text.comment(protocol.doc, WIDTH),
-            options=option_lines(self._names.upper, check),
+            options=option_lines(self._names.upper, check, slave=self._has_slave),
             example=example_lines(self._plan, self._names, self._section),
             max_wire_size=max(whole.max_wire_size, self._section.view.max_wire),
+            stamps=stamps(protocol),
             limits=limits(whole, self._plan),
             enums=enum_views(protocol, self._names),
             helpers=self._layouts.helpers(),
             has_text=any(run.text for run in runs),
             has_bytes=bool(runs) or self._copies,
-            has_table=isinstance(check, CrcView) or any(each.kind == "crc" for each in self._layouts.checks),
+            in_flash=self._in_flash,
             extended=sorted(self._layouts.extended),
             floats=self._floats(),
             nearest=nearest_helpers(self._types, self._plan.messages),
             types=list(self._types.named.values()),
         )
+
+    @property
+    def _in_flash(self) -> bool:
+        """Whether tables may be in the flash of AVR: those of check values and of handlers."""
+        checked = any(each.kind == "crc" for each in self._layouts.checks)
+        return checked or isinstance(self._section.check, CrcView) or self._has_slave
+
+    @property
+    def _has_slave(self) -> bool:
+        """Whether the header has the dispatch of a slave."""
+        return self._protocol.directions != ("message",) and self._plan.role != "master"
 
     @property
     def _copies(self) -> bool:
