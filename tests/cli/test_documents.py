@@ -198,6 +198,16 @@ def test_links(document: str) -> None:
         assert (path.parent / target).exists(), target
 
 
+def test_docstrings_cite_rows_of_the_page_of_q_link() -> None:
+    page = (REPOSITORY / "docs/qlink.md").read_text("utf-8")
+    rows = set(re.findall(r"^\| ([0-9]+) \|", page, re.MULTILINE))
+    sources = [path.read_text("utf-8") for path in (REPOSITORY / "qlinkgen/protocols/qlink").glob("*.py")]
+    cited = {number for text in sources for number in re.findall(r"docs/qlink\.md, ([0-9]+)", text)}
+    assert cited
+    assert cited <= rows
+    assert "settled question" not in "".join(sources).lower()
+
+
 def test_the_tutorial_has_every_frame_of_its_document() -> None:
     document = (REPOSITORY / "docs/pump-bus.md").read_text("utf-8")
     frames = re.findall(r"unit +(55 AA(?: [0-9A-F]{2})+)$", document, re.MULTILINE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import csv
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -72,6 +73,24 @@ def test_what_is_written_is_read_back(register: str) -> None:
         getattr(rig.host, f"set_{register}")(2, **value)
         assert getattr(getattr(rig.host, f"get_{register}")(2), field) == value[field]
         assert getattr(getattr(rig.host, f"get_{register}")(1), field) == ChipSet().axes[1].values[register]
+
+
+def test_the_page_says_what_is_known() -> None:
+    page = (Path(__file__).parents[2] / "docs/mc1231a.md").read_text("utf-8")
+    assert f"the {len(ROWS)} commands whose codes are known" in page
+    assert f"For {len(WEAK)} rows no source confirms" in page
+    unknown = page.partition("**Missing commands.**")[2].partition("\n- ")[0]
+    names = re.findall(r"[A-Z_0-9]{8,}", unknown)
+    assert len(names) == 8
+    assert not {name.lower() for name in names} & set(mc1231a.COMMANDS)
+
+
+def test_the_phase_info_is_flags() -> None:
+    flags = mc1231a.PhaseInfo
+    named = (flags.HALL, flags.MICROSTEPPING, flags.TWO_PHASE, flags.PRESCALER, flags.NOT_INITIALISED)
+    assert [int(each) for each in named] == [1 << bit for bit in (0, 2, 3, 7, 8)]
+    response = mc1231a.GetPhaseInfoResponse(value=flags.TWO_PHASE | 1 << 12)
+    assert int(response.value) == 0x1008  # bits without a name are kept
 
 
 def test_registers_are_those_of_the_table() -> None:

@@ -117,6 +117,7 @@ def test_a_lost_port_is_told_to_who_waits_and_to_who_sends() -> None:
     far.close()
     waiting.join(PATIENCE)
     assert len(failures) == 1
+    assert mc.netstat == 0, "nothing failed to be sent"
     with pytest.raises(PortLost):
         mc.print_(10, "x")
     with pytest.raises(PortLost):
