@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import did_you_mean
 from qlinkgen.link.codec import Framed

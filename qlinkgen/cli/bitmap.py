@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.types import Flags
 from qlinkgen.plan.parts import MarkPart

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 
 import click
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.vectors.choice import MINIMUM
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.arguments import protocol_argument

@@ -5,11 +5,11 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.captures.records import FORMATS, Format, Problems
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import is_hex, parse_hex, warn

@@ -14,10 +14,10 @@ import operator
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any, TypeAlias
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.spelling import similar
 from qlinkgen.model.values import Json
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import ModuleType
 from typing import Protocol as TypingProtocol
 from typing import cast
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.cli.codec import MessageObject
 from qlinkgen.cli.streams import Bad, Event, OneWay
 from qlinkgen.link.codec import Message

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import click
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.common import parse_hex, warn
 from qlinkgen.cli.crc_unknown import Recovered, recover

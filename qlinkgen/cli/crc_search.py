@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.checksum import Checksum, of_width
 from qlinkgen.plan.check import Check
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 import itertools
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.checksum import Algorithm
 
 Order = Literal["big", "little"]

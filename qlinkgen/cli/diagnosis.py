@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.link.codec import Module
 from qlinkgen.link.echo import PROBE
 from qlinkgen.transport.conversation import host_slack, timing_of

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.base import is_generated
 from qlinkgen.cli import manifest, output
 from qlinkgen.cli.boundary import WRONG, Failure

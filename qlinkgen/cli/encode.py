@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from types import ModuleType
 
 import click
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.arguments import assignments_argument, message_argument, protocol_argument
 from qlinkgen.cli.boundary import Failure

@@ -5,12 +5,12 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import Literal
 
 import click
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.captures.records import NANO
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import find_message

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.vectors import choice
 from qlinkgen.backends.vectors.choice import Chance
 from qlinkgen.backends.vectors.faults import Bad, Faults, Good

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.cli.fuzz_cases import VALID, Case
 from qlinkgen.errors import LinkError, NoReply, Refused
 from qlinkgen.link.codec import Command, Framed, is_message

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from types import ModuleType
 from typing import assert_never
 
 import click
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.codec import fields
 from qlinkgen.cli.common import on_terminal

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from types import ModuleType
 from typing import get_args
 
 import click
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.common import warn

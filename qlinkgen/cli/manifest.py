@@ -11,10 +11,11 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TypedDict
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen._resources import library_dir, schemas_dir
 from qlinkgen.backends.base import is_generated
 from qlinkgen.cli.boundary import WRONG, Failure

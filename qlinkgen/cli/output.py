@@ -9,10 +9,11 @@ import stat
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 import click
+
+from qlinkgen._dataclass import dataclass
 
 #: Suffix of temporary files; those of a killed run are removed by the next one.
 _PREFIX, _SUFFIX = ".qlinkgen-", ".tmp"

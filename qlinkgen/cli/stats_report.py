@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from html import escape
 
 import click
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.captures.statistics import Histogram, Row, Statistics
 from qlinkgen.cli.tables import Table
 from qlinkgen.model.protocol import Protocol

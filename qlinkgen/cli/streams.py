@@ -10,10 +10,10 @@ Most frames do not state whether they are requests or responses. Without a direc
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from types import ModuleType
 from typing import Protocol, assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.cli.codec import MessageObject
 from qlinkgen.link.codec import Fault, Framed, Message, address_of, is_message, unproven
 from qlinkgen.model.message import Direction

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
 import click
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.cli.common import on_terminal
 from qlinkgen.model.texts import one_line, visible
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.base import Options, Outputs
 from qlinkgen.model.protocol import Protocol
 

@@ -11,10 +11,11 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar, Literal
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.errors import QlinkgenError
 from qlinkgen.model.spelling import similar
 from qlinkgen.model.sums import SUMS, Fletcher, Sum, Xor

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from qlinkgen._dataclass import dataclass
 
 #: The bytes that can occur somewhere.
 Alphabet = frozenset[int]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import Literal
+
+from qlinkgen._dataclass import dataclass
 
 _DECIMAL = re.compile(rb"[+-]?([0-9]*)\.?([0-9]*)\Z")
 _HEXADECIMAL = re.compile(rb"[0-9A-Fa-f]+\Z")

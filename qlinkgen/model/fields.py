@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import ClassVar, SupportsInt, assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.condition import Condition
 from qlinkgen.model.greatest import greatest
 from qlinkgen.model.texts import Text

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from typing import ClassVar
+
+from qlinkgen._dataclass import dataclass
 
 _FORMATS = {16: ">e", 32: ">f", 64: ">d"}
 

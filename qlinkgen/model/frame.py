@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Literal, assert_never, get_args
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.checksum import Checksum as Algorithm
 from qlinkgen.model.coding import Coding, Escape, Insert
 from qlinkgen.model.condition import Condition

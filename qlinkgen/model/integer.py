@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.digits import Digits
 from qlinkgen.model.scientific import Scientific
 from qlinkgen.model.words import Words

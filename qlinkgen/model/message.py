@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.fields import Field, Value, docs_of, greatest_size, separated_size, values_of
 from qlinkgen.model.texts import Text
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.fields import Value
 from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds, MarkedFrame, PacketFrame, PartBits
 from qlinkgen.model.message import Direction, Example, Message

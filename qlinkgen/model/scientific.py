@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 import struct
-from dataclasses import dataclass
 from fractions import Fraction
+
+from qlinkgen._dataclass import dataclass
 
 _NUMBER = re.compile(rb"[+-]?(?=\.?[0-9])([0-9]*)\.?([0-9]*)(?:[Ee]([+-]?[0-9]+))?\Z")
 _FORMATS = {32: ">f", 64: ">d"}

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import ClassVar, Literal
+
+from qlinkgen._dataclass import dataclass
 
 __all__ = ["SUMS", "Fletcher", "Sum", "Xor"]
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from types import MappingProxyType
 from typing import Literal
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.message import Message
 from qlinkgen.model.texts import Labels, Text

@@ -8,12 +8,13 @@ orders and groups of seven bits share one mechanism.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from decimal import Context, Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import ClassVar, Literal
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.floats import Float
 from qlinkgen.model.integer import (

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.checksum import Checksum as AnyAlgorithm
 from qlinkgen.model.checksum import Sum
 from qlinkgen.model.frame import Checksum

@@ -34,9 +34,10 @@ is the first answer to the request whose payload is valid; if none is, the fault
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.message import Direction
 from qlinkgen.plan import content
 from qlinkgen.plan.conditional import Conditional

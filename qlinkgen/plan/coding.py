@@ -6,10 +6,10 @@ They define what every target prints. Reading is slow but says where each byte c
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol, assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model import coding as stated
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.condition import Condition, Test
 from qlinkgen.plan.parts import CellPart, CheckPart, ConstantPart, LengthPart, Part
 from qlinkgen.plan.payload import Member

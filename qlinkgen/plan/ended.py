@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.plan.ends import ByTerminator
 from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.framing import FramePlan

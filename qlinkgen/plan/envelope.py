@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.frame import ATTRIBUTE
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.conditional import Conditional

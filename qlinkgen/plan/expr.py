@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import gcd
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.integer import packed_size
 from qlinkgen.model.types import Characters
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.integer import Integer
 from qlinkgen.plan.content import BadContent, broken, count_items, right, unpack_items
 from qlinkgen.plan.expr import Condition

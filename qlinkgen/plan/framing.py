@@ -8,9 +8,10 @@ protocol is an id and a payload, its response a payload and a check value.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.frame import (
     DelimitedFrame,
     Frame,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.transaction import Selection
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.tree import Plan

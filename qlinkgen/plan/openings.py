@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.condition import Test
 from qlinkgen.plan.payload import Member, RecordPlan, RecordsStep, RecordStep, ValueStep, value_name
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.digits import Digits
 from qlinkgen.model.integer import Chunk, Integer
 from qlinkgen.model.types import Settable

@@ -8,11 +8,12 @@ sizes are consistent, so a decoder reports `length` before `range`, in any order
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import groupby
 from typing import Literal, assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.condition import Test, turning_points
 from qlinkgen.model.integer import BitOrder, Integer

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Literal
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.frame import FrameKinds, Part
 from qlinkgen.model.integer import Chunk
 from qlinkgen.model.protocol import Protocol

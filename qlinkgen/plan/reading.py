@@ -7,9 +7,10 @@ split.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.plan.coding import Bytewise, Insertion
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure
 from qlinkgen.plan.ends import ByKind, ByLength, ByMark, ByMessage, BySilence, ByTerminator, ByTurn, Rescan

@@ -7,9 +7,9 @@ the four strategies.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec, Decoded, take_packet
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
 from typing import Literal
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.fields import Layout, layouts_of
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.protocol import Protocol

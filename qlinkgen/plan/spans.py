@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import Enum
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.parts import Part

@@ -6,8 +6,7 @@ compiler, besides the codings themselves, implements it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from qlinkgen._dataclass import dataclass
 from qlinkgen.plan.coding import Add, Bytewise, Insertion, Read, Stage
 
 

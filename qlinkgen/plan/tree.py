@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import get_args
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.fields import Layout, layouts_of
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.protocol import Protocol

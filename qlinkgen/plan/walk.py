@@ -8,9 +8,9 @@ size are walked one after the other in the same way. Bytes after the last segmen
 from __future__ import annotations
 
 from collections.abc import Collection, Generator, Iterator, Mapping
-from dataclasses import dataclass
 from typing import TypeVar, assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.condition import Test
 from qlinkgen.plan.expr import Size
 from qlinkgen.plan.payload import (

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.conditional import holds
 from qlinkgen.backends.c.crc import CheckView, render
 from qlinkgen.backends.c.names import grouped, unsigned

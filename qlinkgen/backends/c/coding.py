@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.places import in_hex
 from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
 

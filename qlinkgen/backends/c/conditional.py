@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.conditions import condition
 from qlinkgen.backends.c.names import unsigned
 from qlinkgen.backends.c.places import Places

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends import c_text
 from qlinkgen.backends.c.names import Names, bracketed, integer_type, literal, unsigned
 from qlinkgen.model.protocol import Protocol

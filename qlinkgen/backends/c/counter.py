@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.names import Names, scalar_type, unsigned
 from qlinkgen.model import naming
 from qlinkgen.plan import Plan

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.checksum import Algorithm, Checksum, Fletcher, Sum, Xor, catalogue

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c import checks, filled
 from qlinkgen.backends.c.encode import item_offset, loop, wide_bytes
 from qlinkgen.backends.c.layout import pointer

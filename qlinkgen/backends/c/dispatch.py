@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.echoes import of_reply, of_response
 from qlinkgen.backends.c.framing import Address, Expected, Function, expected, payload_arguments
 from qlinkgen.backends.c.names import Names, count_type, unsigned

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c import checks, filled
 from qlinkgen.backends.c.layout import Layouts, pointer
 from qlinkgen.backends.c.members import count_of, member_of

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.integer import BitOrder
 
 

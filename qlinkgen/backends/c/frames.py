@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c import crc, framing
 from qlinkgen.backends.c.checks import condition
 from qlinkgen.backends.c.kinds import KindsView, kinds_views

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.checks import condition, refused_when_received
 from qlinkgen.backends.c.names import Names, storage, unsigned, unsigned_type
 from qlinkgen.backends.c.separated import constant_size

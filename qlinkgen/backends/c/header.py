@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from operator import attrgetter
 from typing import get_args
 
 import jinja2
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends import c_text
 from qlinkgen.backends.base import banner
 from qlinkgen.backends.c import dispatch, framing

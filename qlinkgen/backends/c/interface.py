@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.conditions import condition, numbers_of, place_of
 from qlinkgen.backends.c.dispatch import callback_name, handler_name
 from qlinkgen.backends.c.frames import frame_section

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.names import Names, scalar_type
 from qlinkgen.model import naming
 from qlinkgen.plan.tree import Plan

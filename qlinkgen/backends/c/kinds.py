@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.backends.c.places import in_hex, sender_of

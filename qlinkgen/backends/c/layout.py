@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.crc import field_check
 from qlinkgen.backends.c.forms import Helper, decimal_helpers, row_helpers, wide_helpers
 from qlinkgen.backends.c.names import storage, unsigned, unsigned_type

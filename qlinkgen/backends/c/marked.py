@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.check_values import differs, put_check
 from qlinkgen.backends.c.names import Names, unsigned_type
 from qlinkgen.backends.c.places import any_of, in_hex, sender_of

@@ -6,8 +6,7 @@ protocols are functions for each command, in `master_asks`; the rest is one temp
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends import c_text
 from qlinkgen.backends.base import Outputs, banner
 from qlinkgen.backends.c.describe import WIDTH

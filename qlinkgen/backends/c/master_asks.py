@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c import framing
 from qlinkgen.backends.c.dispatch import bits_of, items_said, microseconds_of
 from qlinkgen.backends.c.frames import FrameSection

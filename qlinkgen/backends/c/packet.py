@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.check_values import differs, put_check
 from qlinkgen.backends.c.crc import finished
 from qlinkgen.backends.c.framing import Function, struct_parameter

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c import filled
 from qlinkgen.backends.c.check_values import CheckWriter
 from qlinkgen.backends.c.checks import as_unsigned, from_unsigned, refused_before_sending

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.model.naming import address_member

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, unsigned_type
 from qlinkgen.backends.c.places import in_hex

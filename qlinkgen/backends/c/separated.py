@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c import checks
 from qlinkgen.backends.c.decode import Decoder, other_than
 from qlinkgen.backends.c.encode import Encoder, loop

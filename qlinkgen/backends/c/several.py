@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.checks import broken, condition
 from qlinkgen.backends.c.names import Names, count_type, scalar_type
 from qlinkgen.model.message import Message

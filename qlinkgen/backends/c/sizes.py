@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.checks import broken, refusal
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.members import count_of

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends import c_text
 from qlinkgen.backends.c.constants import constant_type
 from qlinkgen.backends.c.names import Names, bracketed, is_wide, scalar_literal, scalar_type

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c.check_values import BlocksView, ValueView
 from qlinkgen.backends.c.coding import EndedView, stage_views
 from qlinkgen.backends.c.conditional import ConditionalView

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.c import checks, varied
 from qlinkgen.backends.c.conditions import condition, numbers_of, place_of
 from qlinkgen.backends.c.decode import Decoder

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.base import banner
 from qlinkgen.backends.conformance import streams
 from qlinkgen.backends.conformance.layout import numbers, wrapped

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.conformance import streams
 from qlinkgen.backends.conformance.layout import call, comment, folded, numbers, row_lines
 from qlinkgen.backends.conformance.rows import Right, Row, Wrong, presences

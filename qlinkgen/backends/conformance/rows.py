@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from decimal import Decimal
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.conformance.sources import Header, JsonObject, Sources
 from qlinkgen.model.fields import Record, Records, Value, chosen
 from qlinkgen.model.message import Message

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import typing
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.payload import Holder, PayloadPlan, Presence, RunStep

@@ -6,9 +6,9 @@ The receiver of the plan determines the expected events.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.conformance.rows import Right, Row
 from qlinkgen.model.message import Direction
 from qlinkgen.plan import MessagePlan, Plan

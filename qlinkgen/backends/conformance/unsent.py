@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.conformance.rows import Right, held, number_bytes, value_sizes
 from qlinkgen.backends.conformance.sources import Header
 from qlinkgen.model.message import Message

@@ -6,9 +6,9 @@ Both use the same tree, so the tests run the structures that readers review.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends import python_text
 from qlinkgen.model.texts import one_line
 

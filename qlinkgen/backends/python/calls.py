@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Protocol as Protocol_
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends import python_text
 from qlinkgen.backends.base import banner
 from qlinkgen.backends.python import docstrings, values

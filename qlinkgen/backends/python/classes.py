@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends import python_text
 from qlinkgen.backends.python import docstrings, values
 from qlinkgen.backends.python.decode import Decoder

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.python.layout import literal
 from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
 

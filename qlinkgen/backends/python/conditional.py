@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.python import integers, pieces, values
 from qlinkgen.backends.python.check_views import PlacedCheck
 from qlinkgen.backends.python.decode import Decoder

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.python import filled, floats, integers, pieces, values
 from qlinkgen.backends.python.layout import WIDTH, in_hex, indented, literal, slice_of, wrapped
 from qlinkgen.backends.python.names import held

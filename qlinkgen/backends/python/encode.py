@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.python import floats, integers, pieces
 from qlinkgen.backends.python.filled import Filling, filling
 from qlinkgen.backends.python.layout import (

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.python import integers, pieces
 from qlinkgen.backends.python.layout import bare, slice_of
 from qlinkgen.backends.python.place import Place

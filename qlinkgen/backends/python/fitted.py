@@ -10,9 +10,10 @@ from __future__ import annotations
 import io
 import tokenize
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from tokenize import TokenInfo
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.python.layout import WIDTH
 
 _CLOSING = {"(": ")", "[": "]", "{": "}"}

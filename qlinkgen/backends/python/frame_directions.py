@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.python import pieces
 from qlinkgen.backends.python.layout import in_hex
 from qlinkgen.backends.python.names import attribute, class_name

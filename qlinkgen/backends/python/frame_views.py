@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.python.check_views import CheckView, PlacedCheck
 from qlinkgen.backends.python.coding import CodingView
 from qlinkgen.backends.python.conditional import AfterView, ConditionalView

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.python.layout import slice_of
 from qlinkgen.model import naming
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.python import integers, pieces, values
 from qlinkgen.backends.python.check_views import CheckView
 from qlinkgen.backends.python.conditional import AfterView, after_view

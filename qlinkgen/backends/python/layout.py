@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+
+from qlinkgen._dataclass import dataclass
 
 #: Maximum line length of generated code.
 WIDTH = 88

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends import python_text
 from qlinkgen.backends.base import banner
 from qlinkgen.backends.python import frames, tables

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.python.names import named_classes
 from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.integer import ByteOrder

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends import python_text
 from qlinkgen.backends.python import docstrings
 from qlinkgen.backends.python.calls import (

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.python import floats, integers
 from qlinkgen.backends.python.decode import assigned, assigned_targets, converted
 from qlinkgen.backends.python.layout import in_hex, indented, literal, wrapped

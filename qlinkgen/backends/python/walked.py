@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.python import integers, pieces
 from qlinkgen.backends.python.decode import Decoder, assigned_targets, divided
 from qlinkgen.backends.python.encode import Encoder, Row

@@ -8,7 +8,8 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+
+from qlinkgen._dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen._dataclass import dataclass
 from qlinkgen.backends.vectors.choice import filled, whole
 from qlinkgen.backends.vectors.writer import Json
 from qlinkgen.model.integer import Integer
