@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import product
 
-from qlinkgen.model.condition import Condition, turning_points
+from qlinkgen.model.condition import Condition, Test, turning_points
 
 #: A condition and the size of what is present where it holds.
 Sized = tuple[Condition, int]
@@ -39,10 +40,17 @@ def _greatest(sized: Sequence[Sized]) -> int:
     if len(names) > _MOST_VALUES:
         firsts = [(when[:1], size) for when, size in sized]
         return sum(map(_greatest, _connected(firsts)))
-    points = [turning_points(test for test in tests if test.value == name) for name in names]
+    outcomes = [_outcomes({test for test in tests if test.value == name}) for name in names]
+    sizes = Counter[frozenset[Test]]()
+    for when, size in sized:
+        sizes[frozenset(when)] += size
     found = 0
-    for numbers in product(*points):
-        given = dict(zip(names, numbers, strict=True))
-        present = (size for when, size in sized if all(test.holds(given[test.value]) for test in when))
-        found = max(found, sum(present))
+    for each in product(*outcomes):
+        true = frozenset[Test]().union(*each)
+        found = max(found, sum(size for when, size in sizes.items() if true >= when))
     return found
+
+
+def _outcomes(tests: Collection[Test]) -> set[frozenset[Test]]:
+    """Which tests of one value hold for any number that it may have."""
+    return {frozenset(test for test in tests if test.holds(raw)) for raw in turning_points(tests)}
