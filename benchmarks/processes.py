@@ -17,11 +17,15 @@ class Run:
         self.wall = Timing()
         self.cpu = Timing()
 
-    def add(self, command: Sequence[str], environment: Mapping[str, str] | None = None) -> None:
-        """Run it once more, without its output; a failure raises RuntimeError."""
+    def add(
+        self, command: Sequence[str], environment: Mapping[str, str] | None = None, given: str | None = None
+    ) -> None:
+        """Run it once more on the input `given`, without its output; a failure raises RuntimeError."""
         before = _cpu()
         start = time.perf_counter()
-        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+        done = subprocess.run(
+            command, capture_output=True, text=True, env=environment, input=given, check=False
+        )
         self.wall.rounds.append(time.perf_counter() - start)
         self.cpu.rounds.append(_cpu() - before)
         if done.returncode:
@@ -39,12 +43,13 @@ def interleave(
     rounds: int,
     environment: Mapping[str, str] | None = None,
     warm: bool = True,
+    given: str | None = None,
 ) -> dict[str, Run]:
     """Run all commands in turns; the first turn warms caches up and is not counted."""
     for command in commands.values() if warm else ():
-        Run().add(command, environment)
+        Run().add(command, environment, given)
     runs = {name: Run() for name in commands}
     for _ in range(rounds):
         for name, command in commands.items():
-            runs[name].add(command, environment)
+            runs[name].add(command, environment, given)
     return runs

@@ -10,7 +10,18 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks import c_codec, generator, host, imports, library, python_codec, ring, stream, wire
+from benchmarks import (
+    c_codec,
+    generator,
+    host,
+    imports,
+    library,
+    python_codec,
+    ring,
+    starting,
+    stream,
+    wire,
+)
 from benchmarks.report import Section, page, section_text
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmarks.md"
@@ -22,6 +33,7 @@ SECTIONS: dict[str, tuple[Callable[[int], Section], int, int]] = {
     "library": (library.section, 600, 30),
     "c": (c_codec.section, 1000, 50),
     "imports": (imports.section, 41, 7),
+    "starting": (starting.section, 15, 2),
     "generator": (generator.section, 4, 1),
     "wire": (wire.section, 200, 20),
     "ring": (ring.section, 200, 20),
