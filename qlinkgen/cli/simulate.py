@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 import click
+from click.core import ParameterSource
 
 from qlinkgen.cli.arguments import protocol_argument
 from qlinkgen.cli.boundary import Failure
@@ -13,6 +14,7 @@ from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, ki
 from qlinkgen.cli.simulating import plan_of
 from qlinkgen.cli.tracing import record_option, trace_option
 from qlinkgen.cli.wire_options import seconds
+from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.replacement import Replacement
 from qlinkgen.protocols.registry import support_of, supported
 
@@ -22,6 +24,9 @@ BELONGS: Belongs = {
     **dict.fromkeys(("ring", "programs", "keys", "closed", "length", "pointed"), (RING,)),
     "crc": (BUS, RING),
 }
+
+#: Options of rings with programs and keypads.
+_WRITTEN = frozenset({"programs", "keys", "closed", "length", "pointed"})
 
 
 @click.command("simulate")
@@ -143,6 +148,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     With --closed the ring has no port, and "port" is null; without a keyboard its time is simulated and
     passes at once, until nothing more can happen or 10 s after the last key.
 
+    Nodes of another ring forward messages, and print those to them as decode does, with "at" and "node".
+
     mc1231a is a chip set with two moving axes. The device of another host answers as nodes do.
 
     Faults are drop, flip, truncate, delay, late, duplicate, stray, noise and silent, each with a probability
@@ -160,7 +167,11 @@ def command(  # noqa: PLR0917  # click passes them by name
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     kind = _kind(protocol, crc)
     plan = plan_of(faults, seed)
-    if kind is RING:
+    if kind is RING and not support_of(load_protocol(protocol, crc)).simulated:
+        from qlinkgen.cli.simulate_nodes import simulate_nodes  # noqa: PLC0415
+
+        simulate_nodes(protocol, ring, link=link, listen=listen, baud=baud, plan=plan, crc=crc, record=record)
+    elif kind is RING:
         from qlinkgen.cli.simulate_ring import simulate_ring  # noqa: PLC0415  # only for rings
 
         simulate_ring(
@@ -215,16 +226,25 @@ def _kind(name: str, crc: Replacement | None) -> Kind:
     """Return the kind of a protocol; refuse kinds that cannot be simulated, and options of other kinds."""
     protocol = load_protocol(name, crc)
     kind = kind_of(protocol)
-    if kind is RING and not support_of(protocol).simulated:
-        known = " and ".join(supported(protocol.bus.kind))
-        raise Failure(
-            f"{protocol.name}: `qlinkgen simulate` supports your own schemas only with bus kind "
-            f"master_slave, link or host; of kind ring it supports only {known}"
-        )
     check_options(protocol.name, kind, BELONGS)
+    if kind is RING and not support_of(protocol).simulated:
+        _check_written(protocol)
     if kind is BUS and not protocol.commands:
         raise Failure(
             f"{protocol.name} has no commands, only messages, so its nodes have nothing to answer; "
             "use `qlinkgen send` to send its messages"
         )
     return kind
+
+
+def _check_written(protocol: Protocol) -> None:
+    """Refuse options of rings that need behaviour written by hand."""
+    context = click.get_current_context()
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if given and name in _WRITTEN:
+            known = " and ".join(supported(protocol.bus.kind))
+            raise Failure(
+                f"{parameter.opts[-1]} is for {known}; nodes of {protocol.name} are passive: omit it"
+            )

@@ -67,6 +67,7 @@ class RingWire(Wire):
             SimulationError: an argument is out of range.
         """
         self._marking = codec.MARKING
+        self._most = codec.BUS.last_node or self._marking.address_mask
         self._plans: Mapping[int, FaultPlan] = faults if isinstance(faults, Mapping) else {}
         self._hops: dict[Sender, _Hop] = {}
         self._places: list[Sender] = []
@@ -93,9 +94,10 @@ class RingWire(Wire):
                 route.outside = after is self._outside
                 route.on_line = True
         self._places = places
-        most = self._marking.address_mask  # limited by the addresses
-        if len(places) > most:
-            raise SimulationError(f"{len(places)} places, including the outside's; a ring has at most {most}")
+        if len(places) > self._most:
+            raise SimulationError(
+                f"{len(places)} places, including the outside's; a ring has at most {self._most}"
+            )
 
     def plan(self, hop: int) -> FaultPlan | None:
         """Return the fault plan of a hop."""
