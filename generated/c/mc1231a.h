@@ -8,7 +8,7 @@
  * changed.
  *
  * C99, C11 and C++17; no library except the headers included below, no allocation, no static data except a CRC
- * table if selected. Functions that write return the number of bytes, or a negative mc1231a_status_t. Optional
+ * table. Functions that write return the number of bytes, or a negative mc1231a_status_t. Optional
  * macros, to be defined before the include:
  *   MC1231A_ENABLE_FLOAT=1    conversions between raw and physical values
  *   MC1231A_REAL=float        those conversions in float, not in double
@@ -60,6 +60,7 @@
 #include <stdint.h>
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
+#include <util/crc16.h>
 #endif
 
 #ifdef __cplusplus

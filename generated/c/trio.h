@@ -8,12 +8,12 @@
  * bytes carry seven bits.
  *
  * C99, C11 and C++17; no library except the headers included below, no allocation, no static data except a CRC
- * table if selected. Functions that write return the number of bytes, or a negative trio_status_t. Optional
+ * table. Functions that write return the number of bytes, or a negative trio_status_t. Optional
  * macros, to be defined before the include:
  *   TRIO_ENABLE_FLOAT=1  conversions between raw and physical values
  *   TRIO_REAL=float      those conversions in float, not in double
  *   TRIO_ENABLE_NAMES=1  names of enum values as text
- *   TRIO_CRC_FORM=FORM   TRIO_CRC_FORM_LOOP (default), _NIBBLE or _TABLE
+ *   TRIO_CRC_FORM=FORM   TRIO_CRC_FORM_LOOP, _NIBBLE, _TABLE or _FOLD, otherwise the best for the chip
  *   TRIO_CRC=NAME        another 16-bit algorithm, such as TRIO_CRC_16_XMODEM
  *
  * Example:
@@ -53,6 +53,7 @@
 #include <stdint.h>
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
+#include <util/crc16.h>
 #endif
 
 #ifdef __cplusplus
@@ -324,12 +325,27 @@ static inline int trio_nearest_int64_(trio_real_t steps, int64_t least, int64_t 
 #define TRIO_CRC_START_ TRIO_CRC_INIT_
 #endif
 
-/* Its form: LOOP is the smallest, NIBBLE has a table of 16 entries, TABLE one of 256 and is the fastest. */
+/* Its form: LOOP has the least code, NIBBLE a table of 16 entries, TABLE one of 256; FOLD has none, for the
+ * polynomial 0x1021. */
 #define TRIO_CRC_FORM_LOOP 1
 #define TRIO_CRC_FORM_NIBBLE 2
 #define TRIO_CRC_FORM_TABLE 3
+#define TRIO_CRC_FORM_FOLD 4
 #ifndef TRIO_CRC_FORM
+/* a computer, where a table is the fastest */
+#if SIZE_MAX > 0xFFFFFFFFU && TRIO_CRC_POLY_ == 0x1021U && TRIO_CRC_REFLECTED_ == 0
+#define TRIO_CRC_FORM TRIO_CRC_FORM_TABLE
+#elif TRIO_CRC_POLY_ == 0x1021U
+#define TRIO_CRC_FORM TRIO_CRC_FORM_FOLD
+#elif defined(__AVR__) /* which shifts by four bits one by one */
 #define TRIO_CRC_FORM TRIO_CRC_FORM_LOOP
+#else
+#define TRIO_CRC_FORM TRIO_CRC_FORM_NIBBLE
+#endif
+#endif
+
+#if TRIO_CRC_FORM == TRIO_CRC_FORM_FOLD && TRIO_CRC_POLY_ != 0x1021U
+#error "TRIO_CRC_FORM_FOLD is for the polynomial 0x1021: select TRIO_CRC_FORM_NIBBLE"
 #endif
 
 #if TRIO_CRC_FORM == TRIO_CRC_FORM_TABLE && \
@@ -337,7 +353,7 @@ static inline int trio_nearest_int64_(trio_real_t steps, int64_t least, int64_t 
 #error "The 256-entry table is for crc-16/ibm-3740: select TRIO_CRC_FORM_NIBBLE, or generate with --set crc=NAME"
 #endif
 
-#if TRIO_CRC_FORM != TRIO_CRC_FORM_LOOP
+#if TRIO_CRC_FORM == TRIO_CRC_FORM_NIBBLE || TRIO_CRC_FORM == TRIO_CRC_FORM_TABLE
 #if defined(__AVR__) /* tables stay in flash */
 #define TRIO_CRC_STORAGE_ PROGMEM
 #define TRIO_CRC_ENTRY_(index) pgm_read_word(&trio_crc_table[(index)])
@@ -422,8 +438,8 @@ TRIO_CRC_DECLARE_ uint16_t trio_crc_table[256] TRIO_CRC_STORAGE_ = {
     0x6E17U, 0x7E36U, 0x4E55U, 0x5E74U, 0x2E93U, 0x3EB2U, 0x0ED1U, 0x1EF0U
 };
 #endif
-#elif TRIO_CRC_FORM != TRIO_CRC_FORM_LOOP
-#error "TRIO_CRC_FORM must be TRIO_CRC_FORM_LOOP, _NIBBLE or _TABLE"
+#elif TRIO_CRC_FORM != TRIO_CRC_FORM_LOOP && TRIO_CRC_FORM != TRIO_CRC_FORM_FOLD
+#error "TRIO_CRC_FORM must be TRIO_CRC_FORM_LOOP, _NIBBLE, _TABLE or _FOLD"
 #endif
 
 /* The initial register, the register after one more byte, and the check value of the final register. */
@@ -450,6 +466,24 @@ static inline uint16_t trio_check_update(uint16_t crc, uint8_t byte)
 #else
     const uint16_t half = (uint16_t)((crc << 4) ^ TRIO_CRC_ENTRY_(((crc >> 12) ^ ((unsigned)byte >> 4)) & 0x0FU));
     return (uint16_t)((half << 4) ^ TRIO_CRC_ENTRY_(((half >> 12) ^ byte) & 0x0FU));
+#endif
+}
+#elif TRIO_CRC_FORM == TRIO_CRC_FORM_FOLD
+/* Of x^16 + x^12 + x^5 + 1 the eight steps of a byte are a few shifts. */
+static inline uint16_t trio_check_update(uint16_t crc, uint8_t byte)
+{
+#if TRIO_CRC_REFLECTED_ && defined(__AVR__)
+    return _crc_ccitt_update(crc, byte);
+#elif TRIO_CRC_REFLECTED_
+    const uint8_t low = (uint8_t)(crc ^ byte);
+    const uint8_t fold = (uint8_t)(low ^ (uint8_t)(low << 4));
+    return (uint16_t)((crc >> 8) ^ (uint16_t)((uint16_t)fold << 8) ^ (uint16_t)((uint16_t)fold << 3) ^ (fold >> 4));
+#elif defined(__AVR__)
+    return _crc_xmodem_update(crc, byte);
+#else
+    const uint8_t high = (uint8_t)((crc >> 8) ^ byte);
+    const uint8_t fold = (uint8_t)(high ^ (high >> 4));
+    return (uint16_t)((uint16_t)(crc << 8) ^ (uint16_t)((uint16_t)fold << 12) ^ (uint16_t)((uint16_t)fold << 5) ^ fold);
 #endif
 }
 #else

@@ -33,6 +33,7 @@ def forms(name: str) -> list[list[str]]:
         [],
         [f"-D{upper}_CRC_FORM={upper}_CRC_FORM_NIBBLE", *everything],
         [f"-D{upper}_CRC_FORM={upper}_CRC_FORM_TABLE"],
+        [f"-D{upper}_CRC_FORM={upper}_CRC_FORM_LOOP"],
     ]
 
 

@@ -9,6 +9,8 @@ from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.checksum import Algorithm, Checksum, Fletcher, Sum, Xor, catalogue
 
+_FOLDED = (16, 0x1021)
+
 
 def algorithm_macro(algorithm: Algorithm) -> str:
     """``crc-16/ibm-3740`` as part of the name of a macro: ``CRC_16_IBM_3740``."""
@@ -48,6 +50,7 @@ class CrcView:
     Attributes:
         key: what the names of its functions begin with, after the prefix of the protocol.
         macros: the same of its macros.
+        folds: its form may be that for the polynomial 0x1021, for which a byte takes a few shifts.
     """
 
     key: str
@@ -58,6 +61,7 @@ class CrcView:
     type: str
     selectable: bool
     turned: bool
+    folds: bool
     choices: list[Choice]
     poly: str
     feedback: str
@@ -187,6 +191,7 @@ def _render_crc(key: str, algorithm: Algorithm, macros: str) -> CrcView:
         type=kind,
         selectable=selectable,
         turned=turned,
+        folds=selectable or (width, algorithm.poly) == _FOLDED,
         choices=[_choice(each) for each in _choices(algorithm)] if selectable else [],
         poly=unsigned(algorithm.poly, width, hexadecimal=True),
         feedback=unsigned(algorithm.feedback, width, hexadecimal=True),

@@ -29,7 +29,9 @@ def option_lines(upper: str, check: CheckView | None, *, slave: bool) -> list[st
         (f"{upper}_ENABLE_NAMES=1", "names of enum values as text"),
     ]
     if isinstance(check, CrcView):
-        options.append((f"{upper}_CRC_FORM=FORM", f"{upper}_CRC_FORM_LOOP (default), _NIBBLE or _TABLE"))
+        options.append(
+            (f"{upper}_CRC_FORM=FORM", f"{upper}_CRC_FORM_{_forms(check)}, otherwise the best for the chip")
+        )
     if isinstance(check, CrcView) and check.selectable:
         options.append((f"{upper}_CRC=NAME", f"another 16-bit algorithm, such as {upper}_CRC_16_XMODEM"))
     if slave:
@@ -37,6 +39,10 @@ def option_lines(upper: str, check: CheckView | None, *, slave: bool) -> list[st
         options.append((f"{upper}_WITHOUT_MESSAGE", "a slave without the command of this name"))
     width = max(len(name) for name, _ in options)
     return [f"{name:<{width}}  {what}" for name, what in options]
+
+
+def _forms(check: CrcView) -> str:
+    return "LOOP, _NIBBLE, _TABLE or _FOLD" if check.folds else "LOOP, _NIBBLE or _TABLE"
 
 
 def example_lines(plan: Plan, names: Names, section: FrameSection) -> list[str]:
