@@ -69,6 +69,9 @@
 #include <stdint.h>
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
+/* Steps of a CRC, inlined: a call would take as long as a step. */
+static inline uint16_t _crc_xmodem_update(uint16_t crc, uint8_t byte) __attribute__((always_inline));
+static inline uint16_t _crc_ccitt_update(uint16_t crc, uint8_t byte) __attribute__((always_inline));
 #include <util/crc16.h>
 #endif
 
@@ -509,6 +512,9 @@ static inline uint16_t qlink_check_update(uint16_t crc, uint8_t byte)
 }
 #elif QLINK_CRC_FORM == QLINK_CRC_FORM_FOLD
 /* Of x^16 + x^12 + x^5 + 1 the eight steps of a byte are a few shifts. */
+#if defined(__AVR__)
+__attribute__((always_inline))
+#endif
 static inline uint16_t qlink_check_update(uint16_t crc, uint8_t byte)
 {
 #if QLINK_CRC_REFLECTED_ && defined(__AVR__)
@@ -575,8 +581,9 @@ static inline uint8_t *qlink_place_(uint8_t *wire, size_t capacity, size_t size)
 static inline int qlink_wrap_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
 {
     const size_t size = (size_t)payload_size;
-    size_t from;
-    size_t to = 2U;
+    uint8_t *to = &wire[2];
+    const uint8_t *from;
+    uint_fast8_t left; /* bytes of the body to send */
     uint8_t *head;
     uint8_t *trailer;
     uint16_t value = qlink_check_start();
@@ -590,35 +597,36 @@ static inline int qlink_wrap_(uint8_t id, uint8_t node, uint8_t *wire, size_t ca
     if (!qlink_fits_(capacity, size)) {
         return QLINK_ERROR_CAPACITY;
     }
-    from = capacity - 5U - size;
     wire[0] = 0xA5U;
     wire[1] = 0xA5U;
-    head = &wire[from];
+    head = &wire[capacity - 5U - size];
+    from = head;
+    left = (uint_fast8_t)(size + 5U);
     head[0] = (uint8_t)(size + 4U);
     head[1] = id;
     head[2] = node;
     trailer = &wire[capacity - 2U];
-    while (from != capacity) {
+    for (; left > 0U; --left) {
         uint8_t byte;
-        if (from == (capacity - 2U)) {
+        if (left == 2U) {
             value = qlink_check_finish(value);
             trailer[0] = (uint8_t)(value >> 8);
             trailer[1] = (uint8_t)(value);
         }
-        byte = wire[from];
+        byte = *from;
         ++from;
         value = qlink_check_update(value, byte);
-        wire[to] = byte;
+        *to = byte;
         ++to;
         if (byte == 0xA5U) {
-            if (to >= from) {
+            if (to == from) {
                 return QLINK_ERROR_CAPACITY;
             }
-            wire[to] = 0x00U;
+            *to = 0x00U;
             ++to;
         }
     }
-    return (int)to;
+    return (int)(to - wire);
 }
 
 /* Unpacks the frame at the beginning of received bytes into a body (the frame without preamble and stuffing), or all of

@@ -53,6 +53,9 @@
 #include <stdint.h>
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
+/* Steps of a CRC, inlined: a call would take as long as a step. */
+static inline uint16_t _crc_xmodem_update(uint16_t crc, uint8_t byte) __attribute__((always_inline));
+static inline uint16_t _crc_ccitt_update(uint16_t crc, uint8_t byte) __attribute__((always_inline));
 #include <util/crc16.h>
 #endif
 
@@ -470,6 +473,9 @@ static inline uint16_t trio_check_update(uint16_t crc, uint8_t byte)
 }
 #elif TRIO_CRC_FORM == TRIO_CRC_FORM_FOLD
 /* Of x^16 + x^12 + x^5 + 1 the eight steps of a byte are a few shifts. */
+#if defined(__AVR__)
+__attribute__((always_inline))
+#endif
 static inline uint16_t trio_check_update(uint16_t crc, uint8_t byte)
 {
 #if TRIO_CRC_REFLECTED_ && defined(__AVR__)

@@ -14,7 +14,7 @@ from qlinkgen.backends.c.coding import EndedView, stage_views
 from qlinkgen.backends.c.conditional import ConditionalView
 from qlinkgen.backends.c.crc import CheckView
 from qlinkgen.backends.c.layout import Layouts
-from qlinkgen.backends.c.names import unsigned_type
+from qlinkgen.backends.c.names import storage, unsigned_type
 from qlinkgen.backends.c.parts import PartWriter, length_bounds
 from qlinkgen.backends.c.places import id_bits, in_hex, sender_of
 from qlinkgen.backends.c.text_ids import numbering
@@ -251,6 +251,8 @@ class StuffedView:
     lead: int
     lead_bytes: list[str]
     head_and_tail: int
+    #: The type of the number of its bytes, the fastest of the chip.
+    count_type: str
     covers_body: bool
     check_from_end: int
     put_header: list[str]
@@ -549,6 +551,7 @@ def _stuffed(writer: PartWriter, stuffing: FrameStuffing, directed: str) -> Stuf
         lead=len(writer.lead),
         lead_bytes=[in_hex(byte) for byte in writer.lead],
         head_and_tail=both,
+        count_type=f"uint_fast{max(8, storage((both + writer.envelope.payload.most).bit_length()))}_t",
         covers_body=writer.covers_body,
         check_from_end=writer.envelope.from_end(part) if part else 0,
         put_header=writer.put_header("head", "size"),
