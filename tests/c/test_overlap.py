@@ -35,6 +35,34 @@ commands:
   motion: {id: 0x20, request: {counter: u8, place: u32}, response: {counter: u8}}
 """
 
+#: The same beside another kind of frame.
+KINDS = """\
+qlinkgen: 1
+protocol: {name: lamps, title: Lamps, revision: "1", source: this test, doc: Lamps}
+frames:
+  usual:
+    parts:
+      start: 7E 7E
+      node: {role: address, type: u8}
+      code: {role: message, type: u8}
+      length: {type: u8, counts: [data]}
+      data: {role: payload, size: 0..8}
+      crc: {type: u16, algorithm: crc-16/xmodem, over: [node, code, data]}
+    coding: {insert: 00, after: 7E, over: [node, code, length, data, crc]}
+  short:
+    parts:
+      begin: C3
+      node: {role: address, type: u8}
+      code: {role: message, type: u8}
+      sum: {type: u8, algorithm: sum8, over: [node, code]}
+bus: {kind: master_slave, nodes: 1..9}
+defaults: {addressing: node, repeat: safe}
+commands:
+  motion: {id: 0x20, frame: usual, request: {counter: u8, place: u32}, response: {counter: u8}}
+messages:
+  tick: {id: 1, frame: short, direction: request, fields: {}}
+"""
+
 #: The master sends a request byte after byte; an answer before its last byte is an overlap. Then each request
 #: that ends with an inserted byte loses it, and is repeated.
 LINE = """
@@ -91,11 +119,12 @@ int main(void)
 REQUESTS = 100_000
 
 
-@pytest.mark.parametrize("name", ["qlink", "lamp"])
+@pytest.mark.parametrize("name", ["qlink", "lamp", "lamps"])
 def test_the_example_waits_for_the_last_byte(
     name: str, tmp_path: Path, require_tool: Callable[..., str]
 ) -> None:
-    protocol, faults = (protocol_of(name), ()) if name == "qlink" else loads(RESCANNED, "lamp.yaml")
+    text = {"lamp": RESCANNED, "lamps": KINDS}.get(name)
+    protocol, faults = (protocol_of(name), ()) if text is None else loads(text, f"{name}.yaml")
     assert protocol, faults
     assert isinstance(plan_of(protocol).frame.receiver, Hunt if name == "qlink" else Rescan)
     (text,) = c.generate(protocol, Options()).values()
