@@ -121,10 +121,12 @@ class DeviceEngine:
         self._last = now
         for event in self._decoder.feed(data):
             if is_message(event):
-                self._tell(Frame(now, False, event.to_frame(), event))
+                if self.frames is not None:
+                    self.frames.append(Frame(now, False, event.to_frame(), event))
                 self._carry_out(event, now)
             else:
-                self._tell(Frame(now, False, event.raw, None, event))
+                if self.frames is not None:
+                    self.frames.append(Frame(now, False, event.raw, None, event))
                 self._refuse(event, now)
 
     def _carry_out(self, request: Framed, now: float) -> None:
@@ -168,17 +170,13 @@ class DeviceEngine:
                 self._due = at + self._turnaround
             self._answers.append((data, message))
 
-    def _tell(self, frame: Frame) -> None:
-        if self.frames is not None:
-            self.frames.append(frame)
-
     def bytes_to_send(self, now: float) -> bytes:
         """Return the answers that are due."""
         if not self._answers or now < self._due:
             return b""
         answers, self._answers = self._answers, []
-        for data, message in answers:
-            self._tell(Frame(now, True, data, message))
+        if self.frames is not None:
+            self.frames.extend(Frame(now, True, data, message) for data, message in answers)
         return b"".join(data for data, _ in answers)
 
     def next_timer(self) -> float | None:

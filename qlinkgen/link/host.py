@@ -248,13 +248,14 @@ class HostEngine:
         self.count.requests += 1
         self._attempts.sent_at = now
         self._awaited.ask(asked, self._unread.line_up(asked, now), check=check)
-        return self._sent(asked, self._attempt, now)
+        return self._sent(asked, now)
 
-    def _sent(self, asked: Asked, attempt: int, now: float) -> bytes:
+    def _sent(self, asked: Asked, now: float) -> bytes:
         """Report a packet that is sent, and return its bytes."""
         if self.verbose:
-            self.events.append(Sent(now, None, asked.request, attempt, asked.frame))
-        self._tell(Frame(now, True, asked.frame, asked.request))
+            self.events.append(Sent(now, None, asked.request, self._attempt, asked.frame))
+        if self.frames is not None:
+            self.frames.append(Frame(now, True, asked.frame, asked.request))
         return asked.frame
 
     def _tell(self, frame: Frame) -> None:
@@ -275,7 +276,7 @@ class HostEngine:
         self._unread.until = self._unread.line_up(asked, now)
         if command.moves:
             self.context = command.makes
-        return self._sent(asked, 1, now)
+        return self._sent(asked, now)
 
     # Receiving ----------------------------------------------------------------------------------------------
 
@@ -311,7 +312,8 @@ class HostEngine:
         except self._decode_errors as error:
             self._wrong_answer(getattr(error, "kind", "frame"), data, str(error), now)
             return
-        self._tell(Frame(now, False, raw, response))
+        if self.frames is not None:
+            self.frames.append(Frame(now, False, raw, response))
         if command.moves:
             self.context = command.makes
         if not awaited.check:
