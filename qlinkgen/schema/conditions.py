@@ -54,7 +54,7 @@ class ConditionBuilder:
         for field in fields:
             spec = self._specs[field.name]
             when = self._condition(field, spec.when or (), found)
-            self._check_possible(field, when)
+            self._check_possible(field, when, found)
             given = not spec.optional and self._holds(when, found)
             found.append(replace(field, when=when, optional=spec.optional, given=given))
         self._check_cases(found)
@@ -89,14 +89,25 @@ class ConditionBuilder:
             yield from value.field.when
             yield Test(value.name, tuple(each for each in ranges if each), text.negated)
 
-    def _check_possible(self, field: Field, when: Condition) -> None:
-        """Check that no two tests exclude each other."""
+    def _check_possible(self, field: Field, when: Condition, before: Sequence[Field]) -> None:
+        """Check that no two tests exclude each other, and that the values tested can have such numbers."""
         for index, test in enumerate(when):
             if any(exclusive((other,), (test,)) for other in when[:index]):
                 name = field.slot or field.name
                 what = f"{name} is never present: its conditions on {test.value} exclude each other"
                 key = "switch" if field.slot else "if"
                 self._error(field.name, key, what, "remove one of them; those of a tested field apply too")
+                return
+        values = {} if field.slot else self._values(field, before)
+        for name in dict.fromkeys(test.value for test in when if test.value in values):
+            tested, tests = values[name].type, [test for test in when if test.value == name]
+            assert isinstance(tested, Scalar)
+            low, high = tested.minimum, tested.maximum
+            raws = (raw for raw in {low, *turning_points(tests)} if low <= raw <= high)
+            if not any(all(test.holds(raw) for test in tests) for raw in raws):
+                what = f"{field.name} is never present: no {name} of {low}..{high} meets its conditions"
+                hint = f"name values that {name} can have, or remove {field.name}"
+                self._error(field.name, "if", what, hint)
 
     def _values(self, field: Field, before: Sequence[Field]) -> Mapping[str, Value]:
         """The values that a condition on a field may be about, by name."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from qlinkgen.model.types import Enum, Flags, NamedValue
 from qlinkgen.model.words import Words
@@ -36,6 +36,14 @@ def carrier(text: str) -> tuple[int, bool] | None:
     if not match or int(match["bits"]) > MAX_BITS:
         return None
     return int(match["bits"]), match["sign"] == "i"
+
+
+def repeated_constant(numbers: Sequence[int]) -> tuple[str, str] | None:
+    """What is wrong with a list of constants that has one of them twice, and the fix."""
+    again = next((each for at, each in enumerate(numbers) if each in numbers[:at]), None)
+    if again is None:
+        return None
+    return f"{again} is twice in the list of constants", "write each number once, first the one that is sent"
 
 
 def build_enum(name: str, spec: EnumSpec, report: Reporter) -> Enum:

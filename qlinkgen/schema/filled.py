@@ -10,7 +10,7 @@ from qlinkgen.model.fields import Field
 from qlinkgen.model.types import Bits, Checked, Derived, Float, Role, Scalar
 from qlinkgen.schema.algorithms import AlgorithmBuilder
 from qlinkgen.schema.file_fields import Fields, FieldSpec
-from qlinkgen.schema.notation import DERIVED, shown
+from qlinkgen.schema.notation import DERIVED, beyond, shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
@@ -110,7 +110,11 @@ class FilledBuilder:
             return None
         if not self._has_place(before[names.index(name) :], place, "equals"):
             return None
-        return Derived(name, bool(match["not"]), int((match["added"] or "0").replace(" ", "")))
+        added = int((match["added"] or "0").replace(" ", ""))
+        if fault := beyond(added, name, kind.bits):
+            self._error(place, "equals", *fault)
+            return None
+        return Derived(name, bool(match["not"]), added)
 
     def _has_place(self, between: Sequence[Field], place: Path, key: str) -> bool:
         """Whether the fields from the first one named on are at constant distances, or at counted ones."""

@@ -12,6 +12,7 @@ from qlinkgen.schema.coding import CodingBuilder
 from qlinkgen.schema.file_frames import FrameSpec, KindSpec, MarkedSpec, PartSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
+from qlinkgen.schema.notation import beyond
 from qlinkgen.schema.part_conditions import PartConditions, check_conditions
 from qlinkgen.schema.part_digits import check_kind
 from qlinkgen.schema.part_directions import check_directions
@@ -338,6 +339,12 @@ class FrameBuilder:
             elif part.derivation and source.role == "length" and frame.checked_after:
                 what = f"{part.name} cannot repeat a length of stuffed bytes"
                 self._report.error("bad-frame", (*path, part.name, "equals"), what, "stuff the whole frame")
+            elif (
+                part.derivation
+                and part.scalar
+                and (fault := beyond(part.derivation.added, source.name, part.scalar.bits))
+            ):
+                self._report.error("bad-frame", (*path, part.name, "equals"), *fault)
 
     def _check_length(self, frame: DelimitedFrame, path: Path) -> None:
         length = frame.part("length")

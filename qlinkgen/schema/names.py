@@ -51,7 +51,7 @@ def check_names(
     """
     check = _Checker(report)
     check.spelling(file.protocol.name, ("protocol", "name"))
-    check.constants(file)
+    check.declared(file)
     for name in file.attributes:
         check.spelling(name, ("attributes", name))
     address = check.parts(file, frame)
@@ -98,7 +98,8 @@ class _Checker:
         self._error("bad-name", path, f"{shown(name)} is not a name", hint)
         return False
 
-    def constants(self, file: SchemaFile) -> None:
+    def declared(self, file: SchemaFile) -> None:
+        """Names of enums, flags, types and sides."""
         for group in ("enums", "flags"):
             for name, spec in getattr(file, group).items():
                 self.spelling(name, (group, name))
@@ -106,6 +107,8 @@ class _Checker:
                     self.spelling(member, (group, name, "values", member))
         for name in file.types:
             self.spelling(name, ("types", name))
+        for index, side in enumerate(file.bus.sides or ()):
+            self.spelling(side, ("bus", "sides", index))
 
     def parts(self, file: SchemaFile, frame: Frame | None) -> str | None:
         """Check the names of the parts of a frame; return the name of the address."""

@@ -29,6 +29,19 @@ _VERSION = re.compile(r"[0-9]{1,9}(?:\.[0-9]{1,9}){0,5}\Z", re.ASCII)
 DERIVED = re.compile(
     r"\s*(?P<not>~?)\s*(?P<name>[a-z][a-z0-9_]*)\s*(?P<added>[-+]\s*[0-9]{1,20})?\s*\Z", re.ASCII
 )
+
+
+def beyond(added: int, name: str, bits: int) -> tuple[str, str] | None:
+    """What is wrong with a number that is added to, or taken from, one of so many bits, and the fix."""
+    most = (1 << bits) - 1
+    if abs(added) <= most:
+        return None
+    what = f"{abs(added)} is beyond the range of {name}, 0..{most}"
+    same = abs(added) & most
+    sign = "-" if added < 0 else "+"
+    return what, f"write {sign} {same}, which gives the same number" if same else "add nothing"
+
+
 #: What a field of an answer repeats of its request: request.NAME.
 REPEATED = re.compile(r"\s*request\s*\.\s*(?P<name>[a-z][a-z0-9_]*)\s*\Z", re.ASCII)
 _SECONDS = {"us": Fraction(1, 10**6), "ms": Fraction(1, 1000), "s": Fraction(1)}

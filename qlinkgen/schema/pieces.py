@@ -12,6 +12,7 @@ from qlinkgen.model.frame import Counting, DelimitedFrame, Frame, Part, PartBits
 from qlinkgen.model.message import Direction
 from qlinkgen.model.types import Bits, Blob, Characters, Flags, Float, Scalar, byte_chunks
 from qlinkgen.schema.bit_directions import bits_direction, counted, other_tests
+from qlinkgen.schema.constants import repeated_constant
 from qlinkgen.schema.file_fields import FieldSpec
 from qlinkgen.schema.file_frames import PartBitSpec, PartSpec
 from qlinkgen.schema.notation import NO_ID, StatedId, shown
@@ -185,6 +186,8 @@ class PieceBuilder:
     def _constants(self, spec: PartSpec | PartBitSpec, bits: int, path: Path) -> tuple[int, ...]:
         for number in spec.const or ():
             self._check_fits(number, bits, (*path, "const"))
+        if repeated := repeated_constant(spec.const or ()):
+            self._report.error("duplicate-value", (*path, "const"), *repeated)
         return tuple(dict.fromkeys(spec.const or (0,)))
 
     def _directions(self, spec: PartSpec | PartBitSpec, bits: int, path: Path) -> Mapping[str, int]:

@@ -124,8 +124,8 @@ _ALL = (
     ),
     Rule(
         "duplicate-value",
-        "A number of an enum or a bit of flags has one name.",
-        "With two names, decoding would be ambiguous.",
+        "A number of an enum or a bit of flags has one name; a list of constants has a number once.",
+        "With two names, decoding would be ambiguous. A repeated constant is a slip for another one.",
     ),
     Rule("bits-overlap", "Bit fields do not overlap.", "Both would write the same bit."),
     Rule("bits-do-not-fit", "Bit fields are inside their integer.", "The integer does not have such a bit."),
@@ -153,7 +153,8 @@ _ALL = (
         "for it, or the payload ends before it. Each frame has such a value, which its caller gives; the "
         "frame has a length or a terminator, and is the only kind. Where that field is absent by its own if, "
         "this one is too. Fields after one that takes the rest are always present, or absent wherever it is "
-        "present. A count has the condition of the field that it counts.",
+        "present. A count has the condition of the field that it counts. Some number of each tested "
+        "value meets the conditions on it.",
     ),
     Rule(
         "bad-link",
@@ -351,7 +352,7 @@ _ALL = (
         "A check value or a derived number of a payload follows from fields right before it.",
         "Encoders fill it in and decoders compare it, so the places of the bytes that it follows from are "
         "known: fields of the same message or record, one after the other, of constant or counted size. "
-        "It is an unsigned integer of whole bytes.",
+        "It is an unsigned integer of whole bytes, and what is added to it is within its range.",
     ),
     Rule("id-does-not-fit", "A message id fits its part of the frame.", "It could not be sent."),
     Rule(

@@ -22,7 +22,14 @@ from qlinkgen.model.types import (
     byte_chunks,
     group_chunks,
 )
-from qlinkgen.schema.constants import INTEGER, MAX_BITS, MAX_WIDE_BITS, carrier, integer_range
+from qlinkgen.schema.constants import (
+    INTEGER,
+    MAX_BITS,
+    MAX_WIDE_BITS,
+    carrier,
+    integer_range,
+    repeated_constant,
+)
 from qlinkgen.schema.file_fields import FieldSpec
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.filled import is_filled
@@ -278,7 +285,10 @@ def _constants(scalar: Scalar, values: list[int | bool | Decimal | str], locatio
         location.fault("bad-value", "const", what, "write one number")
         return replace(scalar, role=Constant())
     sent, *others = (defaulted(scalar, each, "const", location) for each in values)
-    accepted = dict.fromkeys(each.default for each in others if each.default != sent.default)
+    numbers = [sent.default, *(each.default for each in others)]
+    if repeated := repeated_constant(numbers):
+        location.fault("duplicate-value", "const", *repeated)
+    accepted = dict.fromkeys(numbers[1:])
     return replace(sent, role=Constant(tuple(accepted)))
 
 
