@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from qlinkgen.errors import IllegalCommand
+from qlinkgen.errors import IllegalCommand, NoReply
 from qlinkgen.link.events import Frame
 from qlinkgen.link.host_events import InStep
 from qlinkgen.pytest_plugin import BusPairs
@@ -114,6 +114,15 @@ def test_what_the_device_does_not_know_it_rejects(bus_pair: BusPairs) -> None:
     handlers.status = lambda request, now: "7"  # type: ignore[method-assign]
     with pytest.raises(TypeError, match=r"status.request returned '7', which is not its response"):
         bus_pair(f"{PACKAGE}.pump", handlers).master.status()
+
+
+def test_a_device_that_rejects_nothing_is_silent(bus_pair: BusPairs) -> None:
+    """Where the schema has no check value for that; an answer without bytes is not a rejection."""
+    mute: Any = of_text(PUMP.replace(", rejected: 0", "").replace("name: pump", "name: mute"))
+    pair = bus_pair(mute.Device, mute.SlaveHandlers(), attempts=1)
+    with pytest.raises(NoReply):
+        pair.master.drain()
+    assert pair.others[0].counters.illegal == 1
 
 
 def test_a_packet_that_is_cut_is_ended_and_the_loss_is_told(
