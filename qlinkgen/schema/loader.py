@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
@@ -11,6 +10,7 @@ from qlinkgen.errors import Fault, SchemaError
 from qlinkgen.model.frame import Frame, FrameKinds
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.replacement import Replacement
+from qlinkgen.model.texts import schema_hash
 from qlinkgen.schema.addresses import check_addresses
 from qlinkgen.schema.asked import check_told
 from qlinkgen.schema.commands import CommandBuilder, build_bus
@@ -188,7 +188,7 @@ def _build(
         bus=bus,
         commands=tuple(transactions),
         messages=tuple(commands.messages),
-        schema_hash=hashlib.sha256(text.replace("\r\n", "\n").encode()).hexdigest()[:12],
+        schema_hash=schema_hash(text),
         schema_file=file_name,
         includes=file.include or "",
         version=str(version) if version else "",

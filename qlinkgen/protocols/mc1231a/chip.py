@@ -256,7 +256,7 @@ class ChipSet:
 
 
 _OWN: Final = {name.removeprefix("_do_") for name in vars(ChipSet) if name.startswith("_do_")}
-NEEDS.commands(mc1231a.COMMANDS, {*AXIS_COMMANDS, *_OWN})
+NEEDS.commands({*AXIS_COMMANDS, *_OWN})
 
 
 def _respond(response: type[mc1231a.Response] | None) -> Callable[[float | None], mc1231a.Response]:

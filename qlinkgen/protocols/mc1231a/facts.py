@@ -8,32 +8,30 @@ from qlinkgen.codecs import mc1231a
 from qlinkgen.link.host_rules import HostRules
 from qlinkgen.protocols.needs import Needs
 
-NEEDS: Final = Needs("schemas/mc1231a.yaml", "qlinkgen/protocols/mc1231a")
-NEEDS.fields(
-    mc1231a.MESSAGES,
-    {
-        **dict.fromkeys(("set_1.request", "set_2.request", "set_i.request", "reset.request"), ""),
-        **dict.fromkeys(("update.request", "rst_status.request", "rst_intrpt.request"), ""),
-        "multi_update.request": "axes",
-        "get_status.response": "status",
-        **{
-            f"set_{register}.request": "value"
-            for register in ("pos", "vel", "acc", "max_acc", "jerk", "ratio", "buf_mtr_cmd", "brk_pnt")
-        },
-        **{f"set_{register}.request": "value" for register in ("pos_err", "mtr_lmt", "mtr_bias")},
-        "set_intrpt_mask.request": "mask",
+#: Fields by message, and values by enum or flags, that this package uses.
+FIELDS: Final = {
+    **dict.fromkeys(("set_1.request", "set_2.request", "set_i.request", "reset.request"), ""),
+    **dict.fromkeys(("update.request", "update.response", "rst_status.request", "rst_intrpt.request"), ""),
+    "multi_update.request": "axes",
+    "multi_update.response": "",
+    "get_status.request": "",
+    "get_status.response": "status",
+    **{
+        f"set_{register}.request": "value"
+        for register in ("pos", "vel", "acc", "max_acc", "jerk", "ratio", "buf_mtr_cmd", "brk_pnt")
     },
-)
-NEEDS.names(
-    mc1231a,
-    {
-        "AxisStatus": (
-            "motion_complete position_wrapped breakpoint_reached capture_received motion_error "
-            "positive_limit negative_limit command_error motor_on axis_on in_motion commutation_error"
-        ),
-        "OutputMode": "pwm dac16",
-    },
-)
+    **{f"set_{register}.request": "value" for register in ("pos_err", "mtr_lmt", "mtr_bias")},
+    "set_intrpt_mask.request": "mask",
+}
+ENUMS: Final = {
+    "axis_status": (
+        "motion_complete position_wrapped breakpoint_reached capture_received motion_error positive_limit "
+        "negative_limit command_error motor_on axis_on in_motion commutation_error"
+    ),
+    "output_mode": "pwm dac16",
+}
+NEEDS: Final = Needs(mc1231a, "qlinkgen/protocols/mc1231a")
+NEEDS.check(FIELDS, enums=ENUMS, attributes=("axis", "double_buffered"))
 AxisStatus: TypeAlias = mc1231a.AxisStatus
 
 #: Latched bits of the status word.

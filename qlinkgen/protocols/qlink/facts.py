@@ -7,44 +7,48 @@ from typing import Final
 from qlinkgen.codecs import qlink
 from qlinkgen.protocols.needs import Needs
 
-_NEEDS: Final = Needs("schemas/qlink.yaml", "qlinkgen/protocols/qlink")
-_NEEDS.fields(
-    qlink.MESSAGES,
-    {
-        "node_setup.request": "node node_number t1_delay t2_delay position_type",
-        "node_setup.response": "node",
-        "node_info.response": (
-            "version_major version_minor product_id t1_delay t2_delay position_type serial_number"
-        ),
-        "node_start.request": "node",
-        "node_stop.request": "node",
-        "node_sync.request": "counter",
-        "node_program_load.request": "counter program_data",
-        "node_program_load.response": "counter",
-        "node_reset.request": "node",
-        "motor_response_poll.response": "last_completion motor_data",
-        "motor_request.request": "motor_data",
-        "motion.request": "counter outputs segments",
-        "motion.response": "counter inputs position motor_status fifo_space",
-        "motor_position.response": "position",
-        "clear_fifo.request": "node",
-        "preset_motor_position.request": "position",
-        "read.request": "size offset",
-        "read.response": "data",
-        "write.request": "offset data",
-        "write_read.request": "outputs",
-        "write_read.response": "inputs",
-        "set_outputs.request": "mask",
-        "clear_outputs.request": "mask",
-        "loop_back.request": "offset data",
-        "loop_back.response": "offset data",
-    },
-)
-_NEEDS.names(qlink, {"PositionType": "none", "MotorStatus": "running position_valid"})
+#: Fields by message, and values by enum or flags, that this package uses.
+FIELDS: Final = {
+    "node_setup.request": "node node_number t1_delay t2_delay position_type",
+    "node_setup.response": "node",
+    "node_info.request": "node",
+    "node_info.response": (
+        "version_major version_minor product_id t1_delay t2_delay position_type serial_number"
+    ),
+    "node_start.request": "node",
+    "node_stop.request": "node",
+    "node_sync.request": "counter",
+    "node_program_load.request": "counter program_data",
+    "node_program_load.response": "counter",
+    "node_reset.request": "node",
+    **dict.fromkeys(("node_reset.response", "motor_request.response", "write.response"), "node"),
+    **dict.fromkeys(("clear_fifo.response", "preset_motor_position.response"), "node"),
+    **dict.fromkeys(("set_outputs.response", "clear_outputs.response"), "node"),
+    **dict.fromkeys(("motor_response_poll.request", "motor_position.request"), "node"),
+    "motor_response_poll.response": "last_completion motor_data",
+    "motor_request.request": "motor_data",
+    "motion.request": "counter outputs segments",
+    "motion.response": "counter inputs position motor_status fifo_space",
+    "motor_position.response": "position",
+    "clear_fifo.request": "node",
+    "preset_motor_position.request": "position",
+    "read.request": "size offset",
+    "read.response": "data",
+    "write.request": "offset data",
+    "write_read.request": "outputs",
+    "write_read.response": "inputs",
+    "set_outputs.request": "mask",
+    "clear_outputs.request": "mask",
+    "loop_back.request": "offset data",
+    "loop_back.response": "offset data",
+}
+ENUMS: Final = {"position_type": "none jvl_mactalk", "motor_status": "running position_valid"}
+_NEEDS: Final = Needs(qlink, "qlinkgen/protocols/qlink")
+_NEEDS.check(FIELDS, enums=ENUMS)
 
-BAUD: Final = _NEEDS.bus(qlink.BUS, "baud")
-BROADCAST: Final = _NEEDS.bus(qlink.BUS, "broadcast")
-NODES: Final = range(_NEEDS.bus(qlink.BUS, "first_node"), _NEEDS.bus(qlink.BUS, "last_node") + 1)
+BAUD: Final = _NEEDS.bus("baud")
+BROADCAST: Final = _NEEDS.bus("broadcast")
+NODES: Final = range(_NEEDS.bus("first_node"), _NEEDS.bus("last_node") + 1)
 #: Words that one motion can carry.
 WORDS: Final = _NEEDS.items(qlink.MotionRequest, "segments")
 #: Bytes of a program's text that one request can carry.

@@ -7,22 +7,21 @@ from typing import Final
 from qlinkgen.codecs import trio
 from qlinkgen.protocols.needs import Needs
 
-_NEEDS: Final = Needs("schemas/trio.yaml", "qlinkgen/protocols/trio")
-_NEEDS.fields(
-    trio.MESSAGES,
-    {
-        "character_transfer": "address characters",
-        "direct_variable_transfer": "address number value",
-        "keypad_offset": "address offset",
-        "keypad_mode": "address mode",
-    },
-)
-_NEEDS.names(trio, {"KeypadModeEnum": "on_only on_off"})
+#: Fields by message, and values by enum, that this package uses.
+FIELDS: Final = {
+    "character_transfer": "address characters",
+    "direct_variable_transfer": "address number value",
+    "keypad_offset": "address offset",
+    "keypad_mode": "address mode",
+}
+ENUMS: Final = {"keypad_mode": "on_only on_off"}
+_NEEDS: Final = Needs(trio, "qlinkgen/protocols/trio")
+_NEEDS.check(FIELDS, enums=ENUMS)
 
 #: BASIC's number of the next node along the ring, whose address on the wire is 1 (Network Node Addressing).
 FIRST_NODE = 10
 #: Largest number of nodes of a ring.
-MOST_NODES: Final = _NEEDS.bus(trio.BUS, "last_node")
+MOST_NODES: Final = _NEEDS.bus("last_node")
 LAST_NODE = FIRST_NODE + MOST_NODES - 1
 #: Last variable of a Motion Coordinator (GET, VR(x)).
 LAST_VARIABLE = 250
