@@ -459,7 +459,7 @@ class HostEngine:
             return
         kinds = attempts.wrong_kinds()
         if kinds == ["illegal"] and len(attempts.wrong) == attempts.number:
-            self._fail(IllegalCommand, "unknown command: the checksum of the device is 0", now)
+            self._fail(IllegalCommand, "unknown command: the check value of the answer rejects it", now)
         elif kinds:
             self._fail(BadReply, f"received only invalid replies ({', '.join(kinds)})", now)
         else:
