@@ -326,7 +326,11 @@ class KindMaker:
         low, high = limits_of(kind)
         const = self.rng.choice((high, low, self.rng.randint(low, high)))
         several = self.rng.random() < 0.2
-        return {"type": kind, **order, "const": [const, low, high] if several else const}, size
+        return {
+            "type": kind,
+            **order,
+            "const": [*dict.fromkeys((const, low, high))] if several else const,
+        }, size
 
     def _reserved(self) -> tuple[Any, int]:
         kind, order, size = self._integer()
