@@ -21,7 +21,6 @@ from qlinkgen.cli.filters import Filter, FilterOptions, Flagged, filter_options
 from qlinkgen.cli.tables import Table
 from qlinkgen.model.fields import Record, Records, Value
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Array, Enum, Flags, Scalar
 from qlinkgen.model.values import Json
 
 Form = Literal["text", "json"]
@@ -127,7 +126,7 @@ class Coverage:
         self.frames = {each.name: 0 for each in protocol.messages}
         self._values = {
             message.name: [
-                (".".join(path), path, value, Seen(_names(value))) for path, value in _paths(message.values)
+                (".".join(path), path, value, Seen(value.members)) for path, value in _paths(message.values)
             ]
             for message in protocol.messages
         }
@@ -188,18 +187,9 @@ def _row(value: Value, seen: Seen) -> tuple[str, str, str]:
     if seen.least is None:
         return "", "", ""
     span = f"{seen.least}" if seen.least == seen.most else f"{seen.least}..{seen.most}"
-    scalar = value.type.item if isinstance(value.type, Array) else value.type
-    plain = isinstance(scalar, Scalar) and scalar.scaling is None and scalar.meaning is None
-    return span, f"{scalar.minimum}..{scalar.maximum}" if plain and isinstance(scalar, Scalar) else "", ""
-
-
-def _names(value: Value) -> tuple[str, ...]:
-    scalar = value.type.item if isinstance(value.type, Array) else value.type
-    if not isinstance(scalar, Scalar):
-        return ()
-    if isinstance(scalar.meaning, Enum | Flags):
-        return tuple(each.name for each in scalar.meaning.members)
-    return ("false", "true") if scalar.meaning == "bool" else ()
+    number = value.number
+    plain = number is not None and number.scaling is None and number.meaning is None
+    return span, f"{number.minimum}..{number.maximum}" if number is not None and plain else "", ""
 
 
 def _paths(values: Iterable[Value], before: Path = ()) -> Iterator[tuple[Path, Value]]:

@@ -18,7 +18,6 @@ from qlinkgen.cli.conditions import Condition, ConditionError, parse_condition
 from qlinkgen.model.fields import Record, Records, Value
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Array, Enum, Flags, Scalar
 from qlinkgen.model.values import Json
 
 FlagForm = Literal["number", "names"]
@@ -165,10 +164,9 @@ class Flagged:
 
 
 def _has_flags(value: Value) -> bool:
-    kind = value.type.item if isinstance(value.type, Array) else value.type
-    if isinstance(kind, Record | Records):
-        return any(map(_has_flags, kind.layout.values))
-    return isinstance(kind, Scalar) and isinstance(kind.meaning, Flags)
+    if isinstance(value.type, Record | Records):
+        return any(map(_has_flags, value.type.layout.values))
+    return value.flags is not None
 
 
 def _with_names(values: Iterable[Value], given: Mapping[str, Json]) -> dict[str, Json]:
@@ -186,11 +184,11 @@ def _named_flags(value: Value, given: Json) -> Json:
         kind = value.type
         assert isinstance(kind, Record | Records)
         return _with_names(kind.layout.values, given)
-    scalar = value.type.item if isinstance(value.type, Array) else value.type
-    if not isinstance(given, int) or not isinstance(scalar, Scalar) or not isinstance(scalar.meaning, Flags):
+    flags = value.flags
+    if not isinstance(given, int) or flags is None:
         return given
-    names: list[Json] = [each.name for each in scalar.meaning.members if given >> each.value & 1]
-    rest = given & ~scalar.meaning.mask
+    names: list[Json] = [each.name for each in flags.members if given >> each.value & 1]
+    rest = given & ~flags.mask
     return [*names, *([rest] if rest else [])]
 
 
@@ -207,7 +205,7 @@ def _condition(protocol: Protocol, text: str) -> Condition:
         names |= {record_key(value.name) for value in protocol.beside(message)}
         for path, value in _paths(message.values):
             names.add(path)
-            texts.update(_texts(value))
+            texts.update(value.members)
     try:
         return parse_condition(text, names, texts)
     except ConditionError as error:
@@ -219,9 +217,3 @@ def _paths(values: Iterable[Value], before: str = "") -> Iterator[tuple[str, Val
         yield f"{before}{value.name}", value
         if isinstance(value.type, Record | Records):
             yield from _paths(value.type.layout.values, f"{before}{value.name}.")
-
-
-def _texts(value: Value) -> Iterator[str]:
-    scalar = value.type.item if isinstance(value.type, Array) else value.type
-    if isinstance(scalar, Scalar) and isinstance(scalar.meaning, Enum | Flags):
-        yield from (each.name for each in scalar.meaning.members)

@@ -293,24 +293,37 @@ class Value:
         return self.type.required and not self.field.conditional
 
     @property
+    def number(self) -> Scalar | None:
+        """Its number, or that of each item; None for bytes, text and records."""
+        kind = self.type.item if isinstance(self.type, Array) else self.type
+        return kind if isinstance(kind, Scalar) else None
+
+    @property
     def unit(self) -> str:
         """The unit of its numbers, "" for bytes, text and records."""
-        kind = self.type.item if isinstance(self.type, Array) else self.type
-        return kind.unit if isinstance(kind, Scalar) else ""
+        return self.number.unit if self.number else ""
+
+    @property
+    def flags(self) -> Flags | None:
+        """The flags that it has, or that each item has; None for other values."""
+        meaning = self.number.meaning if self.number else None
+        return meaning if isinstance(meaning, Flags) else None
+
+    @property
+    def members(self) -> tuple[str, ...]:
+        """Names of the values, flags or truths that it or each item can have."""
+        meaning = self.number.meaning if self.number else None
+        if meaning == "bool":
+            return ("true", "false")
+        return tuple(each.name for each in meaning.members) if isinstance(meaning, Enum | Flags) else ()
 
     @property
     def names(self) -> tuple[tuple[str, ...], str]:
         """The names that it may have, and the mark between several of them: "" if it has one."""
         many = isinstance(self.type, Array)
-        kind = self.type.item if isinstance(self.type, Array) else self.type
-        meaning = kind.meaning if isinstance(kind, Scalar) else None
-        if meaning == "bool":
-            return ("true", "false"), "," if many else ""
-        if isinstance(meaning, Enum):
-            return tuple(each.name for each in meaning.members), "," if many else ""
-        if isinstance(meaning, Flags) and not many:
-            return tuple(each.name for each in meaning.members), "|"
-        return (), ""
+        if self.flags is not None:
+            return ((), "") if many else (self.members, "|")
+        return self.members, "," if many and self.members else ""
 
 
 def greatest_size(fields: Iterable[Field]) -> int:
