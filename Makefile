@@ -37,11 +37,15 @@ setup: .venv/.dev  ## Make .venv with qlinkgen (editable) and the developers' to
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps $(CRSF)
 	@touch $@
 
-demo: .venv/.user  ## A message of each protocol in construct, Python and C; then a bus, a ring and a chip set behind ptys
+demo: .venv/.user  ## A message of each protocol in construct, Python and C; a bus, a ring and a chip set; statistics
+	@mkdir -p build
 	@$(BIN)/python examples/demo.py
-	@$(BIN)/python examples/bus.py
+	@$(BIN)/python examples/bus.py build/demo.pcapng
 	@$(BIN)/python examples/ring.py
 	@$(BIN)/python examples/chip.py
+	@echo "statistics of the recorded bus:"
+	@$(BIN)/qlinkgen stats qlink build/demo.pcapng
+	@$(BIN)/qlinkgen stats qlink build/demo.pcapng --format html -o build/demo.html
 
 test: lint  ## Lint, types, layers, drift of the generated files, then every test
 	@echo "== pytest"

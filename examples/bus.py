@@ -1,14 +1,16 @@
 """A Q.link bus without hardware: nodes on a pty, a master that moves them, and every frame on the wire.
 
 Run it with ``make demo``, or separately with ``python examples/bus.py``. The master opens the pty by its
-name, like /dev/ttyUSB0, and works in the same way on a real bus.
+name, like /dev/ttyUSB0, and works in the same way on a real bus. Its traffic is recorded if a file is named.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from contextlib import ExitStack
 
+from qlinkgen.captures.recording import Recording
 from qlinkgen.codecs import qlink
 from qlinkgen.link import Monitor, SlaveEngine, Timing
 from qlinkgen.link.codec import address_of
@@ -33,7 +35,11 @@ def main() -> int:
         for number in (1, 3, 7)
     }
     recorder = Recorder()
-    with simulated(nodes, recorder) as line, Bus.open(line.path, slack=SLACK) as bus:
+    with ExitStack() as ended:
+        line = ended.enter_context(simulated(nodes, recorder))
+        recording = ended.enter_context(Recording(sys.argv[1])) if len(sys.argv) > 1 else None
+        on_frame = recording.port(line.path, qlink, speed=BAUD) if recording else None
+        bus = ended.enter_context(Bus.open(line.path, slack=SLACK, on_frame=on_frame))
         print(f"a simulated bus at {line.path}, {BAUD} baud")
         for found in bus.scan(nodes):
             assert found.info is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,8 +13,8 @@ from tests.cli.test_boundary import ENVIRONMENT
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 
-def demo(environment: dict[str, str], name: str = "demo.py") -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, str(REPOSITORY / "examples" / name)]
+def demo(environment: dict[str, str], name: str = "demo.py", *rest: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, str(REPOSITORY / "examples" / name), *rest]
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
@@ -31,12 +32,18 @@ def test_without_a_compiler() -> None:
     assert "apt-get install gcc" in done.stderr
 
 
-def test_the_bus() -> None:
-    done = demo(ENVIRONMENT, "bus.py")
+def test_the_bus(tmp_path: Path) -> None:
+    capture = tmp_path / "demo.pcapng"
+    done = demo(ENVIRONMENT, "bus.py", str(capture))
     assert done.returncode == 0, done.stdout + done.stderr
     assert "position 720" in done.stdout
     assert "a5 a5 04 03 03 75 6c" in done.stdout, "the frame that starts node 3"
     assert "0 timeouts" in done.stdout
+    command = [sys.executable, "-m", "qlinkgen", "stats", "qlink", str(capture), "--format", "json"]
+    stats = json.loads(subprocess.run(command, env=ENVIRONMENT, capture_output=True, check=True).stdout)
+    assert {row["name"] for row in stats["rows"]} >= {"node_info", "node_start", "motion"}
+    assert sum(row["responses"] for row in stats["rows"]) > 10
+    assert stats["faults"] == {}
 
 
 def test_the_ring() -> None:
@@ -57,3 +64,4 @@ def test_make_runs_all_of_them() -> None:
     text = (REPOSITORY / "Makefile").read_text("utf-8")
     for name in ("demo.py", "bus.py", "ring.py", "chip.py"):
         assert f"examples/{name}" in text
+    assert "stats qlink build/demo.pcapng --format html -o build/demo.html" in text
