@@ -111,7 +111,7 @@ FAULTS = {
     "answers of any node": ("return (frame->node == job->node)", "return true || (frame->node == job->node)"),
     "no look at the deadline": ("qlink_reached_(now, bus->deadline)", "(now == 7U)"),
     "a request that ends before the line is free": (
-        "bus->free_at = bus->paced ? (now + on_wire + after) : now;",
+        "bus->free_at = now + on_wire + after;",
         "bus->free_at = now;",
     ),
 }

@@ -20,6 +20,7 @@ from tests.support.cbmc import (
     reach,
     shrunk,
     write_header,
+    write_master_proof,
     write_message_proof,
     write_receiver_proof,
 )
@@ -99,3 +100,32 @@ def test_messages(name: str, what: str, tmp_path: Path, cbmc: str) -> None:
     protocol = shrunk(protocol_of(name), SMALL_MESSAGE)
     write_header(protocol, tmp_path)
     holds(prove(cbmc, write_message_proof(protocol, tmp_path), what, SMALL_MESSAGE + 2))
+
+
+#: Loops of the master run once per byte of the part of a request that was received.
+MOST = 5
+ECHO = ("matched_.0", "matched_.1", "matched_.2", "is_echo_.0")
+UNWOUND = ("--unwindset", ",".join(f"qlink_bus_{each}:{MOST + 2}" for each in ECHO))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("call", ["start", "receive", "match", "poll", "give_up", "ask"])
+def test_a_call_keeps_the_invariant_of_the_master(call: str, tmp_path: Path, cbmc: str) -> None:
+    """From any state and at any time: by induction it holds for any calls in any order."""
+    proof = write_master_proof(shrunk(protocol_of("qlink"), SMALL["qlink"]), tmp_path, "read", MOST)
+    holds(prove(cbmc, proof, call, UNWIND + 2, *UNWOUND))
+
+
+#: The comparison with an echo runs past the request; the next request is written over an awaited echo.
+MASTER_FAULTS = {"match": ("(matched == bus->size) || ", ""), "poll": ("if (bus->echoing) { /*", "if (false) { /*")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("call", MASTER_FAULTS)
+def test_a_fault_of_the_master_is_found(call: str, tmp_path: Path, cbmc: str) -> None:
+    proof = write_master_proof(shrunk(protocol_of("qlink"), SMALL["qlink"]), tmp_path, "read", MOST)
+    file = tmp_path / "qlink_master.h"
+    text = file.read_text("utf-8")
+    assert text.count(MASTER_FAULTS[call][0]) == 1
+    file.write_text(text.replace(*MASTER_FAULTS[call]), "utf-8")
+    assert prove(cbmc, proof, call, UNWIND + 2, *UNWOUND).failed()

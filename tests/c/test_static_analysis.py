@@ -12,6 +12,7 @@ import yaml
 
 from tests.c.conftest import PROTOCOLS
 from tests.c.test_compile import header
+from tests.c.test_master import write
 
 DEVIATIONS = Path(__file__).with_name("deviations.yaml")
 
@@ -105,6 +106,9 @@ def test_findings_are_those_with_a_reason(tool: str, analyse: Analyse, tmp_path:
     for name in PROTOCOLS:
         header(name, tmp_path)
         found |= analyse(name, tmp_path)
+    for name in ("qlink", "modbus_rtu"):
+        write(name, tmp_path)
+        found |= analyse(f"{name}_master", tmp_path)
     listed = deviations(tool)
     assert {rule: place for rule, place in found.items() if rule not in listed} == {}
     assert [rule for rule in listed if rule not in found] == [], "listed, and found nowhere"

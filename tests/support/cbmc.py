@@ -12,6 +12,7 @@ from pathlib import Path
 
 from qlinkgen.backends import c
 from qlinkgen.backends.base import Options
+from qlinkgen.backends.c import master
 from qlinkgen.backends.c.framing import payload_arguments
 from qlinkgen.backends.c.names import Names
 from qlinkgen.model.frame import DelimitedFrame, Frame, FrameKinds
@@ -21,6 +22,7 @@ from qlinkgen.model.types import Array, Blob
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.ends import Hunt, InStep, Marks
 from qlinkgen.plan.framing import FramePlan
+from tests.support.cmaster_source import asks_of
 
 PROOFS = Path(__file__).parents[1] / "c" / "proofs"
 CHECKS = (
@@ -85,12 +87,12 @@ def _run(cbmc: str, file: Path, function: str, unwind: int, *options: str) -> Ve
     return Verdict(found)
 
 
-def write_header(protocol: Protocol, folder: Path) -> Path:
+def write_header(protocol: Protocol, folder: Path, options: Options = Options()) -> Path:  # noqa: B008  # immutable
     """Write the header to a folder, its receiver without padding.
 
     Without padding, a write past the last array of the receiver is a write past the receiver.
     """
-    (text,) = c.generate(protocol, Options()).values()
+    (text,) = c.generate(protocol, options).values()
     end = f"}} {protocol.name}_receiver_t;"
     assert text.count(end) == 1
     file = folder / f"{protocol.name}.h"
@@ -108,6 +110,24 @@ def write_receiver_proof(protocol: Protocol, folder: Path) -> Path:
         text = text.replace(f"@{key}@", value)
     file = folder / f"receiver_{protocol.name}.c"
     file.write_text(text.replace("@p@", protocol.name).replace("@P@", protocol.name.upper()), "utf-8")
+    return file
+
+
+def write_master_proof(protocol: Protocol, folder: Path, command: str, most: int) -> Path:
+    """Write the header, the master and its proofs of one command; a request has at most ``most`` bytes."""
+    options = Options(only=(command,))
+    write_header(protocol, folder, options)
+    for path, made in master.generate(protocol, options).items():
+        (folder / Path(path).name).write_text(made, "utf-8")
+    _, _, places = _receiver_of(plan_of(protocol).frame)
+    invariant = (PROOFS / "invariant_streamed.c").read_text("utf-8").rstrip()
+    (ask,) = [each for each in asks_of(protocol) if each.doc == command]
+    places |= {"ask": ask.name, "request": ask.request, "response": ask.response, "most": str(most)}
+    text = (PROOFS / "master.c").read_text("utf-8").replace("@invariant@", invariant)
+    for key, value in {**places, "p": protocol.name, "P": protocol.name.upper()}.items():
+        text = text.replace(f"@{key}@", value)
+    file = folder / f"master_{protocol.name}.c"
+    file.write_text(text, "utf-8")
     return file
 
 
