@@ -117,7 +117,10 @@ def test_a_call_keeps_the_invariant_of_the_master(call: str, tmp_path: Path, cbm
 
 
 #: The comparison with an echo runs past the request; the next request is written over an awaited echo.
-MASTER_FAULTS = {"match": ("(matched == bus->size) || ", ""), "poll": ("if (bus->echoing) { /*", "if (false) { /*")}
+MASTER_FAULTS = {
+    "match": ("(matched == bus->size) || ", ""),
+    "poll": ("if (bus->echoing) { /*", "if (false) { /*"),
+}
 
 
 @pytest.mark.slow

@@ -77,7 +77,7 @@ def reach(cbmc: str, file: Path, function: str, unwind: int) -> Verdict:
 
 def _run(cbmc: str, file: Path, function: str, unwind: int, *options: str) -> Verdict:
     command = [cbmc, file.name, "--function", function, "--unwind", str(unwind), *options]
-    done = subprocess.run(command, cwd=file.parent, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, cwd=file.parent, capture_output=True, text=True, timeout=300, check=False)
     found = {each["name"]: (each["text"], each["verdict"]) for each in _PROPERTY.finditer(done.stdout)}
     # 0: all hold; 10: some do not. Any other code is an error of cbmc.
     if done.returncode not in (0, 10) or not found:
