@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["library_dir", "schemas_dir"]
+__all__ = ["cmake_dir", "library_dir", "schemas_dir"]
 
 
 def schemas_dir() -> Path:
@@ -27,3 +27,16 @@ def schemas_dir() -> Path:
 def library_dir() -> Path:
     """Return the folder of the public protocols. Raises FileNotFoundError like `schemas_dir`."""
     return schemas_dir() / "library"
+
+
+def cmake_dir() -> Path:
+    """Return the folder of Qlinkgen.cmake: that of the firmware examples, or its copy in a wheel.
+
+    Raises:
+        FileNotFoundError: the installation has neither, so it is incomplete.
+    """
+    package = Path(__file__).resolve().parent
+    for folder in (package / "cmake", package.parent / "examples" / "firmware" / "cmake"):
+        if (folder / "Qlinkgen.cmake").is_file():
+            return folder
+    raise FileNotFoundError(f"no Qlinkgen.cmake in {package} or next to it; reinstall qlinkgen")

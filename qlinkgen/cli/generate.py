@@ -27,7 +27,8 @@ from qlinkgen.cli.depfile import Depfile
 from qlinkgen.cli.drift import Folder
 from qlinkgen.cli.manifest import schema_of, ships
 from qlinkgen.cli.package import package_option
-from qlinkgen.cli.targets import DEFAULT, TARGETS, reference_outputs
+from qlinkgen.cli.targets import DEFAULT, TARGETS, Generate, reference_outputs
+from qlinkgen.cli.worlds import generators, layout_option
 from qlinkgen.errors import Fault, SchemaError
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.replacement import Replacement
@@ -57,6 +58,7 @@ Role = Literal["both", "master", "slave"]
     "--only", multiple=True, metavar="NAME", help="Generate only this command or message; repeatable."
 )
 @package_option
+@layout_option
 @click.option(
     "--list-outputs", is_flag=True, help="Print the paths of all outputs, one per line; write nothing."
 )
@@ -74,6 +76,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     role: Role,
     only: tuple[str, ...],
     package: str | None,
+    layout: str | None,
     list_outputs: bool,
     dry_run: bool,
     depfile: str | None,
@@ -90,6 +93,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen generate                        all shipped schemas, to generated/
     qlinkgen generate bus.yaml --target c    one header
     qlinkgen generate bus.yaml --package my.wire --target python --target bus -o src
+    qlinkgen generate bus.yaml --layout zephyr -o lib
     qlinkgen generate --check                for CI: 1 and a diff if anything is out of date
     qlinkgen generate qlink --set crc=crc-16/xmodem --role slave --only motion
     """  # noqa: D301  # click takes the character \b for "do not wrap"
@@ -101,9 +105,9 @@ def command(  # noqa: PLR0917  # click passes them by name
         return WRONG
     options = Options(role=role, only=_kept(only, list(protocols.values())))
     folder = Folder(Path(output))
-    _fill(folder, protocols, targets or DEFAULT, options, package)
+    _fill(folder, protocols, generators(targets, layout), options, package)
     folders = [folder]
-    if not (schemas or targets) and output == "generated" and schemas_dir().parent == Path.cwd():
+    if not (schemas or targets or layout) and output == "generated" and schemas_dir().parent == Path.cwd():
         folders.append(_reference())
     if list_outputs:
         return reconcile.list_outputs(folders)
@@ -182,13 +186,12 @@ def _show_hint(protocols: Sequence[Protocol]) -> str:
 def _fill(
     folder: Folder,
     protocols: Mapping[str, Protocol],
-    targets: Sequence[str],
+    targets: Mapping[str, Generate],
     options: Options,
     package: str | None,
 ) -> None:
     with _progress(len(targets) * len(protocols)) as step:
-        for target in dict.fromkeys(targets):
-            generate = TARGETS[target].load()
+        for target, generate in targets.items():
             for schema, protocol in protocols.items():
                 step(f"{target} {protocol.name}")
                 source = schema_of(protocol, schema, folder.root)

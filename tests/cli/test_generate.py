@@ -298,3 +298,12 @@ def test_what_is_committed_is_up_to_date(qlinkgen: Run, monkeypatch: pytest.Monk
     monkeypatch.chdir(REPOSITORY)
     result = qlinkgen("generate", "--check")
     assert result.code == 0, result.out[:2000]
+
+
+def test_a_layout_is_kept_like_a_target(qlinkgen: Run, out: Path) -> None:
+    assert qlinkgen("generate", "qlink", "--layout", "platformio", "-o", str(out)).code == 0
+    assert (out / "qlink/library.json").is_file()
+    assert qlinkgen("generate", "qlink", "--layout", "platformio", "-o", str(out), "--check").code == 0
+    both = qlinkgen("generate", "qlink", "--layout", "cmake", "--target", "c", "-o", str(out))
+    assert both.code != 0
+    assert "--layout cmake writes a library of the C header; leave out --target c" in both.err

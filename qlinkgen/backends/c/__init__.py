@@ -13,12 +13,17 @@ from qlinkgen.model.naming import file_stem
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import Options, plan_of
 
-__all__ = ["generate"]
+__all__ = ["generate", "header_of"]
 
 
 def generate(protocol: Protocol, options: Options) -> Outputs:
     """The header of a protocol."""
-    return {f"c/{file_stem(protocol.name)}.h": Header(plan_of(protocol, options), _templates()).text()}
+    return {f"c/{file_stem(protocol.name)}.h": header_of(protocol, options).text()}
+
+
+def header_of(protocol: Protocol, options: Options) -> Header:
+    """The header of a protocol, not yet as text."""
+    return Header(plan_of(protocol, options), _templates())
 
 
 @functools.cache

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 #: One parameter per line, because names of messages are long.
-_BREAK = "\n *     "
+_BREAK = "\n    "
 
 
 def option_lines(upper: str, check: CheckView | None, *, slave: bool) -> list[str]:

@@ -134,6 +134,11 @@ class Header:
         body = "".join([*self._field_checks(), *sections])
         return tidy(self._place("header", head=self._head(), body=body))
 
+    def example(self) -> list[str]:
+        """The lines of the program in its head comment."""
+        lines = example_lines(self._plan, self._names, self._section)
+        return "\n".join(lines).split("\n")
+
     # Sections
 
     def _place(self, template: str, **views: object) -> str:
@@ -368,7 +373,7 @@ class Header:
             banner=[piece for line in banner(protocol) for piece in c_text.comment(line, WIDTH)],
             about=c_text.comment(protocol.doc, WIDTH),
             options=option_lines(self._names.upper, check, slave=self._has_slave),
-            example=example_lines(self._plan, self._names, self._section),
+            example=self.example(),
             max_wire_size=max(whole.max_wire_size, self._section.view.max_wire),
             stamps=stamps(protocol),
             limits=limits(whole, self._plan),
