@@ -91,9 +91,9 @@ def test_a_type_converts_once(name: str, stem: str) -> None:
     text = header(name)
     assert f"typedef int16_t host_{stem}_t;" in text
     assert text.count(f"host_{stem}_t a;") == 2
-    assert len(re.findall(r"static inline double \w+_physical", text)) == 3  # the type, narrowed, own
-    assert f"double host_{stem}_physical(host_{stem}_t raw)" in text
-    assert "host_set_request_b_raw(double physical, int16_t *raw)" in text
+    assert len(re.findall(r"static inline host_real_t \w+_physical", text)) == 3  # the type, narrowed, own
+    assert f"host_real_t host_{stem}_physical(host_{stem}_t raw)" in text
+    assert "host_set_request_b_raw(host_real_t physical, int16_t *raw)" in text
     for member in ("host_level_t c;", "host_bits16_t d;", "host_below_t h;", "host_plain_t p;"):
         assert member in text
 

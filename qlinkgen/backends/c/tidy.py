@@ -54,6 +54,8 @@ def _shorter(line: str, *, in_macro: bool) -> list[str]:
     if opening and note.endswith("*/"):
         comment = _comment(note.removesuffix("*/").strip(), indent)
         return comment + _folded([code.rstrip()] if code.strip() else [])
+    if line.startswith("#define ") and line.endswith('"'):
+        return [line]  # a fold would add spaces to the string
     if line.startswith("#error "):
         words = textwrap.wrap(line.removeprefix("#error ").strip('"'), _WIDTH - 12)
         return ['#error "' + ' " \\\n    "'.join(words) + '"']
