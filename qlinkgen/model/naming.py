@@ -157,7 +157,7 @@ def member(name: str) -> str:
 
 def address_member(name: str) -> str:
     """The member and the parameter for an address."""
-    return f"{name}_" if name in _C_WORDS or name in _C_LOCALS else name
+    return f"{name}_" if name in _C_WORDS | _C_LOCALS | _C_TYPES else name
 
 
 def handler(name: str, address: str) -> str:

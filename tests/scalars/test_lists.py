@@ -122,8 +122,8 @@ def test_members_in_c() -> None:
         "uint64_t wide[1];",
     ):
         assert member in header
-    assert "double probe_celsius_physical" in header
-    assert "double probe_put_request_wide_physical" in header
+    assert "probe_real_t probe_celsius_physical" in header
+    assert "probe_real_t probe_put_request_wide_physical" in header
 
 
 @pytest.mark.parametrize(

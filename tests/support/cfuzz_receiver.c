@@ -12,16 +12,46 @@ static void @p@_delivered_(bool answer, const @p@_receiver_t *receiver)
 @delivered@
 }
 
+/* A frame passes through the box to the main loop, and from there byte by byte to the wire. */
+static void @p@_boxed_(const @p@_receiver_t *receiver)
+{
+    static @p@_inbox_t inbox;
+    static @p@_outbox_t outbox;
+    const @p@_frame_t frame = @p@_receiver_frame(receiver);
+    const size_t size = (frame.size < sizeof outbox.wire) ? frame.size : sizeof outbox.wire;
+    const @p@_frame_t *kept;
+    uint8_t byte = 0u;
+    REQUIRE(@p@_inbox_frame(&inbox) == NULL);
+    REQUIRE(@p@_inbox_put(&inbox, &frame));
+    REQUIRE(!@p@_inbox_put(&inbox, &frame));
+    kept = @p@_inbox_frame(&inbox);
+    REQUIRE(kept != NULL && kept->size == frame.size && kept->payload != frame.payload);
+    for (size_t index = 0u; index < size; ++index) { outbox.wire[index] = kept->payload[index]; }
+    @p@_outbox_start(&outbox, size);
+    for (size_t index = 0u; index < size; ++index) {
+        REQUIRE(@p@_outbox_next(&outbox, &byte) && byte == kept->payload[index]);
+    }
+    REQUIRE(!@p@_outbox_next(&outbox, &byte));
+    @p@_inbox_clear(&inbox);
+}
+
 static void @p@_event_(bool answer, const @p@_receiver_t *receiver, @p@_event_t event)
 {
-    if (event == @P@_EVENT_FRAME) { @p@_delivered_(answer, receiver); }
+    static @p@_event_counts_t counts;
+    @p@_count_event(&counts, event);
+    if (event == @P@_EVENT_FRAME) {
+        @p@_delivered_(answer, receiver);
+        @p@_boxed_(receiver);
+    }
 }
 
 /* Whether a frame with this id was received. */
 static bool @p@_fed_(bool answer, @p@_receiver_t *receiver, uint8_t byte, uint8_t id)
 {
-    @p@_event_t event = @p@_receive(receiver, byte);
-    bool came = event == @P@_EVENT_FRAME && @p@_receiver_frame(receiver).@id@ == id;
+    @p@_event_t event;
+    bool came;
+    REQUIRE(@p@_receive_bytes(receiver, &byte, 1u, &event) == 1u);
+    came = event == @P@_EVENT_FRAME && @p@_receiver_frame(receiver).@id@ == id;
     @p@_event_(answer, receiver, event);
 @next@
     return came;

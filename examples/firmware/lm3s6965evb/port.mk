@@ -5,4 +5,5 @@ PORT_FLAGS = -mcpu=cortex-m3 -mthumb
 PORT_SOURCES = lm3s6965evb/board.c lm3s6965evb/startup.c
 # newlib is used only for the compiler's calls of memcpy and memset.
 PORT_LDFLAGS = -nostartfiles --specs=nano.specs -T lm3s6965evb/lm3s6965.ld
-APPS = qlink_node trio_keypad $(if $(wildcard $(HEADERS)/qlink_master.h),qlink_master)
+APPS = qlink_node trio_keypad
+APPS += $(if $(wildcard $(HEADERS)/qlink_master.h),qlink_master)

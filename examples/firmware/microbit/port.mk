@@ -5,4 +5,5 @@ PORT_FLAGS = -mcpu=cortex-m0 -mthumb
 PORT_SOURCES = microbit/board.c microbit/startup.c
 # newlib is used only for the compiler's calls of memcpy and memset.
 PORT_LDFLAGS = -nostartfiles --specs=nano.specs -T microbit/nrf51822.ld
-APPS = qlink_node $(if $(wildcard $(HEADERS)/qlink_master.h),qlink_master)
+APPS = qlink_node
+APPS += $(if $(wildcard $(HEADERS)/qlink_master.h),qlink_master)
