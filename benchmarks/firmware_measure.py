@@ -8,6 +8,7 @@ from pathlib import Path
 from benchmarks.firmware_answers import Run, replies
 from benchmarks.firmware_build import HEADERS, TARGETS, Workshop, temporary
 from benchmarks.firmware_cycles import Cycles, all_forms
+from benchmarks.firmware_floor import SIDES, Work, work
 from benchmarks.firmware_size import PROTOCOLS, Core, Costs, Dispatch, buffers, cores, costs, dispatch
 from benchmarks.firmware_slave import PORTS, Slave, slave
 
@@ -22,6 +23,7 @@ class Measured:
     buffers: dict[str, dict[str, dict[str, int]]]
     dispatch: dict[str, dict[str, Dispatch]]
     cycles: dict[str, Cycles]
+    floor: dict[str, dict[str, Work]]
     slaves: dict[str, Slave]
     run: Run
 
@@ -46,6 +48,7 @@ def measure(headers: Path = HEADERS) -> Measured:
             },
             dispatch={target.name: dispatch(shop, target) for target in TARGETS},
             cycles=all_forms(shop),
+            floor={target.name: {side: work(shop, target, side) for side in SIDES} for target in TARGETS},
             slaves={port: slave(shop, port) for port in PORTS},
             run=replies(shop),
         )

@@ -9,7 +9,7 @@ import yaml
 
 from benchmarks.firmware_answers import BAUD, PHASES, Reply
 from benchmarks.firmware_budget import ALLOWANCES, LIMITS, STACK_ALLOWANCES, broken, goals
-from benchmarks.firmware_build import AVR, ROOT, TARGETS, Target, clock
+from benchmarks.firmware_build import AVR, CORTEX_M0, ROOT, TARGETS, Target, clock
 from benchmarks.firmware_cycles import Frame
 from benchmarks.firmware_measure import Measured
 from benchmarks.firmware_peers import Footprint
@@ -25,11 +25,11 @@ _TABLE = re.compile(
 )
 
 OWN = "this header"
-FORMS = {"LOOP": "bitwise", "NIBBLE": "table of 16", "TABLE": "table of 256"}
+FORMS = {"FOLD": "folded", "LOOP": "bitwise", "NIBBLE": "table of 16", "TABLE": "table of 256"}
 _CORES = {
     **{form: f"one message, CRC {title}" for form, title in FORMS.items()},
-    ANSWER: "no message: an empty answer, CRC bitwise",
-    PAYLOAD: "no message: any payload, CRC bitwise",
+    ANSWER: "no message: an empty answer, CRC folded",
+    PAYLOAD: "no message: any payload, CRC folded",
 }
 _BUFFERS = {
     "receiver": "`{0}_receiver_t`",
@@ -47,6 +47,7 @@ def tables(measured: Measured) -> dict[str, str]:
         "core": _core(measured),
         "ram": _ram(measured),
         "choice": _choice(measured),
+        "floor": _floor(measured),
         "cycles": _cycles(measured),
         "answers": _answers(measured),
         "time": _time(measured),
@@ -115,6 +116,23 @@ def _choice(measured: Measured) -> str:
         figures = [str(each) for dispatch in found for each in (dispatch.flash, dispatch.stack)]
         rows.append([name if name == "all" else f"`{name}`", str(choice.lines), *figures])
     return as_markdown(["", "lines", *_by_chip("flash", "stack")], rows)
+
+
+def _floor(measured: Measured) -> str:
+    rows = []
+    for target in TARGETS:
+        unit = "instructions" if target is CORTEX_M0 else "cycles"
+        hand, own = (measured.floor[target.name][side] for side in ("floor", "generated"))
+        for what, least, found in (
+            ("flash, bytes", hand.size.flash, own.size.flash),
+            ("RAM, bytes", hand.size.ram, own.size.ram),
+            ("stack, bytes", hand.stack, own.stack),
+            (f"encode, {unit}", hand.encode, own.encode),
+            (f"receive, {unit}", hand.receive, own.receive),
+            (f"longest call to receive a byte, {unit}", hand.longest, own.longest),
+        ):
+            rows.append([f"{target.title}: {what}", str(least), str(found), f"{found / least:.2f}"])
+    return as_markdown(["", "by hand", "generated", "ratio"], rows)
 
 
 def _messages(measured: Measured, protocol: str) -> str:
@@ -236,7 +254,7 @@ def own_rows(measured: Measured) -> list[list[str]]:
     """The first rows of the peers' table."""
     return [
         _peer(f"{OWN}, CRC {FORMS[form]}", {each.name: measured.core[each.name][form] for each in TARGETS})
-        for form in ("LOOP", "TABLE")
+        for form in ("FOLD", "LOOP", "TABLE")
     ]
 
 

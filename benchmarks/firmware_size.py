@@ -17,7 +17,7 @@ from qlinkgen.model.protocol import Protocol
 from qlinkgen.schema import find, load
 
 ANSWER, PAYLOAD = "ANSWER", "PAYLOAD"
-CRC_FORMS = ("LOOP", "NIBBLE", "TABLE")
+CRC_FORMS = ("FOLD", "LOOP", "NIBBLE", "TABLE")
 PROTOCOLS = ("qlink", "trio")
 
 

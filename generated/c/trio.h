@@ -53,10 +53,11 @@
 #include <stdint.h>
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
-/* Steps of a CRC, inlined: a call would take as long as a step. */
+#ifndef _UTIL_CRC16_H_ /* steps of a CRC, inlined: a call would take as long as a step */
 static inline uint16_t _crc_xmodem_update(uint16_t crc, uint8_t byte) __attribute__((always_inline));
 static inline uint16_t _crc_ccitt_update(uint16_t crc, uint8_t byte) __attribute__((always_inline));
 #include <util/crc16.h>
+#endif
 #endif
 
 #ifdef __cplusplus

@@ -115,14 +115,14 @@ def test_growth_breaks_the_budget(
     (tmp_path / f"{name}.h").write_text(text.replace(place, f"{place} {growth}"))
     shop = Workshop(tmp_path, tmp_path)
     if name == "qlink":
-        goals = core_goals(AVR, core(shop, AVR, "LOOP"))
+        goals = core_goals(AVR, core(shop, AVR, "FOLD"))
     else:
         goals = each_message(AVR, name, messages(shop, AVR, name, framed=False))
         goals.append(receiver_goal(AVR, name, buffers(shop, AVR, name)))
     assert [goal for goal in goals if broken(goal) and goal.what.endswith(noticed)]
 
 
-@pytest.mark.parametrize("form", ["LOOP", "TABLE"])
+@pytest.mark.parametrize("form", ["LOOP", "FOLD"])
 def test_a_late_answer_breaks_the_budget(
     form: str, tmp_path: Path, require_tool: Tool, missing_tool: Missing
 ) -> None:
